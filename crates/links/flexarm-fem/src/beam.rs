@@ -120,12 +120,14 @@ impl Beam {
     pub fn stiffness12(&self) -> Matrix12 {
         let l = self.length;
         let mut K = Matrix12::zeros();
+        // Tension EA/l and torsion GJ/l.
         for (row, k) in [(0, self.bar.EA / l), (3, self.bar.GJ / l)] {
             K[(row, row)] = k;
             K[(row + 6, row + 6)] = k;
             K[(row, row + 6)] = -k;
             K[(row + 6, row)] = -k;
         }
+        // Bending in each plane with shear: f = EI / (l³ (1 + φ)), φ = 12 EI / (G A_s l²).
         for plane in self.planes() {
             let phi = plane.phi;
             let f = plane.EI / (l.powi(3) * (1.0 + phi));

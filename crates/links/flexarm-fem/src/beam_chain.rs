@@ -22,6 +22,7 @@ impl BeamLink {
             return Err(FemError::OutOfRange { what, found, allowed: "2 or more".into() });
         }
         let bar = self.section.bar(&self.material)?;
+        // n - 1 slices, each with its stiffness at its middle.
         let slices = parts - 1;
         let slice = self.length / slices as f64;
         let piece = Beam::new(bar, self.theory, slice)?;
@@ -31,6 +32,7 @@ impl BeamLink {
         let joints = (0..slices)
             .map(|k| ElasticSplit { X_LS: self.X_LE * Pose::translation(place(k) * self.length, 0.0, 0.0), K_S })
             .collect();
+        // Parts reach from middle to middle, the first and last from the ends of the beam.
         let ends: Vec<f64> = std::iter::once(0.0).chain((0..slices).map(place)).chain([1.0]).collect();
         let mut bodies = Vec::with_capacity(parts);
         for pair in ends.windows(2) {

@@ -108,6 +108,7 @@ pub fn energy_by_slice(
                     .map(|()| DMatrix::from_column_slice(size, size, workspace.stiffness()))
             };
             let Some(K_e) = K_e else { continue };
+            // Energy of pairs of unit loads, u_iᵀ K_e u_j, shared among the slices by volume.
             let energy = u.transpose() * K_e * &u;
             let energy = Loads::from_fn(|i, j| energy[(i, j)]);
             // Inverted elements were rejected when the model was assembled.

@@ -190,6 +190,7 @@ pub fn volume_fractions(
     let mut fractions = Vec::with_capacity(planes.len() + 1);
     let (mut whole, mut before) = (None, 1.0);
     for plane in planes {
+        // Share ahead of the plane; the part between two planes is the difference.
         let plane = Plane { normal: plane.normal, point: plane.point };
         let ahead = match piece::side(kind, x, &plane) {
             piece::Side::Ahead => 1.0,

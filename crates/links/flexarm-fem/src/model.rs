@@ -190,6 +190,7 @@ impl FeModel {
                     *x = mesh.nodes[*node as usize];
                 }
                 let material = &materials[block.region];
+                // K_e into the rows of its DoF, M_e, which is the same along x, y and z, into those of its nodes.
                 match workspace.stiffness_and_mass(block.kind, &x, material, options.quadrature) {
                     Ok(()) => {
                         graph.add_blocks(&dofs, nodes, 3, workspace.stiffness(), &mut K.values);
@@ -313,6 +314,7 @@ fn add_beams(
 ) -> Result<(), AssemblyError> {
     for nodes in block.elements() {
         let (beam, Q) = beam_of(mesh, block.region, nodes, &materials[block.region])?;
+        // Beam axes to mesh axes: K = Q K_beam Qᵀ, M likewise.
         let stiffness = Q * beam.stiffness12() * Q.transpose();
         graph.add_blocks(dofs, nodes, 6, stiffness.as_slice(), &mut K.values);
         let mass = Q * beam.mass12() * Q.transpose();

@@ -25,6 +25,8 @@ pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(La
     let mut best: Option<(Law, f64)> = None;
     let mut vain = 0;
     for _ in 0..ATTEMPTS {
+        // Least-time law under the present bounds, averaged over the window, slowed to keep all bounds:
+        // speeds by √(ratio of squares), jerk by its cube root.
         let x = least_time(&slowed)?;
         let raw = Law::new(&s, &x);
         let law = raw.clone().smoothed(window);
@@ -32,6 +34,7 @@ pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(La
         let ratios = ratios(&law, points);
         let most = ratios.iter().fold(1.0, |most: f64, (_, ratio)| most.max(*ratio));
         let slowing = most.sqrt().max(worst_jerk.cbrt());
+        // Keep the fastest law; stop after two attempts that gain nothing.
         let duration = law.duration() * slowing;
         let before = best.as_ref().map_or(f64::INFINITY, |(law, slowing)| law.duration() * slowing);
         vain = if duration < before * (1.0 - NEAR) { 0 } else { vain + 1 };
@@ -51,6 +54,7 @@ pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(La
             reached[first..=last].iter_mut().for_each(|reached| *reached = reached.max(ratio));
         }
         for k in 0..s.len() {
+            // Lower the bounds that were exceeded, raise those that are no longer reached.
             let (cap, most) = (slowed[k].x_max, points[k].x_max);
             if reached[k] > 1.0 {
                 slowed[k].x_max = cap.min(x[k] / reached[k]);

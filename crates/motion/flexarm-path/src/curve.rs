@@ -148,6 +148,7 @@ impl ToolCurve {
             Circle::through(&X0.translation.vector, via, &X1.translation.vector)?;
         let sign = angle.map_or(1.0, f64::signum);
         let length = angle.map_or(to_end, f64::abs) * r;
+        // Orientation over the length s: rotation per length k of the tangent, w of the tool.
         let (R0, R1) = (X0.rotation.into_inner(), X1.rotation.into_inner());
         let k = x.cross(&y) / (r * r * r);
         let end = to_end * r;
@@ -204,6 +205,7 @@ impl ToolCurve {
 
     /// Pose and derivatives at `s`.
     pub fn at(&self, s: f64) -> ToolJet {
+        // Position and its derivatives d/ds.
         let [p, dp, ddp] = match &self.position {
             Position::Line { p0, d } => [p0 + d * s, *d, Vector3::zeros()],
             Position::Arc { c, x, y, r } => {
@@ -213,6 +215,7 @@ impl ToolCurve {
             }
             Position::Quintic(c) => at(c, s),
         };
+        // Rotation, w with dR/ds = [w]x R, and dw/ds.
         let (R, w, dw) = match &self.rotation {
             Rotation::Even { R0, w } => (exp(&(w * s)) * R0, *w, Vector3::zeros()),
             Rotation::WithArc { R0, w, k } => {

@@ -88,6 +88,7 @@ pub fn for_each_point(
     let (mut flat, mut dN) = ([0.0; 3 * MAX_NODES], [Vector3::zeros(); MAX_NODES]);
     for p in 0..table.len() {
         let jacobian = Jacobian::checked(kind, n, table, p, &nodes.x)?;
+        // dN/dx = J^-1 dN/dξ.
         jacobian.gradients(n, table.dN(p), n, &mut flat);
         for i in 0..n {
             dN[i] = Vector3::new(flat[i], flat[n + i], flat[2 * n + i]);

@@ -135,12 +135,14 @@ impl ElementWorkspace {
         rule: Quadrature,
     ) -> Result<(), InvertedElement> {
         let all = tables(kind);
+        // Stiffness from the products of the shape functions' gradients and Hooke's law.
         let affine = rule == Quadrature::Exact && nodes.geometry == Geometry::Affine;
         let products = self.products.as_chunks_mut::<D>().0;
         let largest_det =
             gradient_products::<N, D>(kind, all.stiffness_for(rule, nodes.geometry), nodes, affine, products)?;
         hooke::<D>(products, lame(material), &mut self.stiffness);
 
+        // Mass ρ ∫ N_i N_j dV: with constant J that of the reference element times ρ det J.
         let mut pairs = [0.0; MAX_PAIRS];
         let pairs = &mut pairs[..N * (N + 1) / 2];
         if affine {

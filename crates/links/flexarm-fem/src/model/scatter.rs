@@ -41,6 +41,7 @@ impl NodeGraph {
             }
         }
 
+        // Neighbours of each node on or below the diagonal: nodes of its elements, each once.
         let (mut starts, mut rows, mut before) = (vec![0_u32], Vec::new(), Vec::new());
         let mut seen = vec![u32::MAX; n];
         for node in 0..n {
@@ -64,6 +65,7 @@ impl NodeGraph {
             starts.push(rows.len() as u32);
         }
 
+        // A column of the DoF matrix has the later DoF of its own node and all of the neighbours.
         let mut dof_starts = Vec::with_capacity(dofs.size() + 1);
         dof_starts.push(0_u32);
         for node in 0..n {

@@ -131,6 +131,7 @@ impl Boundary {
                 Tie::Rigid => {
                     for node in &interface.nodes {
                         let dofs = model.dofs.of(*node as usize);
+                        // u_node = u_I + θ_I × (x_node - x_I); rotations are those of the interface.
                         let turn = -(model.nodes[*node as usize] - origin).cross_matrix();
                         is_free[dofs.clone()].fill(false);
                         for (i, dof) in dofs.enumerate() {
@@ -202,6 +203,7 @@ fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
         if interface.nodes.is_empty() {
             return Err(TieError::Empty { interface: interface.name.clone() });
         }
+        // A node belongs to one interface.
         for node in &interface.nodes {
             let before = owner[*node as usize];
             if before != u32::MAX {
@@ -214,6 +216,7 @@ fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
         for node in &interface.nodes {
             owner[*node as usize] = index as u32;
         }
+        // Nodes without rotations must not lie on a line, or the interface could turn about it.
         let turns = interface.nodes.iter().any(|node| model.dofs.of(*node as usize).len() == 6);
         if !(turns && interface.tie == Tie::Rigid) {
             spread(model, interface)?;

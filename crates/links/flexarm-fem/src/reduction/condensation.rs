@@ -155,6 +155,7 @@ impl<'m> Condensation<'m> {
             }
             Some(R)
         };
+        // K_ii = L Lᵀ; a pivot near zero is a mechanism.
         let K_ii = model.K.submatrix(&solved);
         let factor = Cholesky::new(K_ii, options.ordering).map_err(|error| match error {
             NotPositiveDefinite::Pivot { unknown } => {
@@ -191,6 +192,7 @@ impl<'m> Condensation<'m> {
     /// Computes the static shapes and the condensed matrices.
     fn condense(&mut self) {
         let columns = self.boundary.columns();
+        // Static shapes T, then K_g = Tᵀ K T and M_g = Tᵀ M T.
         let (T, lambda) = self.static_shapes(columns);
         self.T_B = blocks(&T.columns(6.min(columns), columns.saturating_sub(6)).into_owned());
         self.T = T;
@@ -215,6 +217,7 @@ impl<'m> Condensation<'m> {
         if means.is_empty() {
             return None;
         }
+        // Rows of G over the solved DoF.
         let m = means.len();
         let mut position = vec![u32::MAX; self.model.size()];
         for (k, dof) in self.solved.iter().enumerate() {

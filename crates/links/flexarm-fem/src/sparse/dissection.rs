@@ -64,6 +64,7 @@ impl Graph {
         let total: u64 = self.weights.iter().map(|w| u64::from(*w)).sum();
         let heaviest = (3 * total / (2 * COARSEST as u64)).max(2) as u32;
         let mut coarse_of = vec![u32::MAX; self.len()];
+        // Vertices with few neighbours first: they have the least choice.
         let mut by_degree: Vec<u32> = (0..self.len() as u32).collect();
         by_degree.sort_by_key(|v| (self.range(*v).len(), scattered(*v)));
         let mut count = 0;
@@ -91,6 +92,7 @@ impl Graph {
     /// Graph of the groups of vertices with the same number in `group_of`; vertices with the number
     /// `u32::MAX` are left out.
     fn grouped(&self, group_of: &[u32], count: usize) -> Self {
+        // One or two vertices per group; their weights add up.
         let mut members = vec![[u32::MAX; 2]; count];
         let mut weights = vec![0; count];
         for (v, group) in group_of.iter().enumerate().filter(|(_, group)| **group != u32::MAX) {
@@ -99,6 +101,7 @@ impl Graph {
             weights[*group as usize] += self.weights[v];
         }
         let mut graph = Self { starts: vec![0], neighbours: Vec::new(), couplings: Vec::new(), weights };
+        // Edges between groups: couplings of parallel edges add up, edges inside a group vanish.
         let mut place = vec![u32::MAX; count];
         for (group, members) in members.iter().enumerate() {
             let first = graph.neighbours.len();

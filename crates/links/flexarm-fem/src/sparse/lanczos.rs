@@ -181,6 +181,7 @@ pub fn modes_of_two_supports(
             continue;
         }
         let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;
+        // Both sets of modes from the same basis; each must have settled.
         let found = if count == 0 { Some(0) } else { ritz.settled(wanted, count, &basis)? };
         let other = basis.released_ritz(released).ok_or(ModesError::NotFinite)?;
         match (found, other.settled(others, others.count(usize::MAX), &basis)?) {

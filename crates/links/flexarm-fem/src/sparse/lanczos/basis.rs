@@ -63,6 +63,7 @@ impl Basis {
                 *x = released.filter(|_| k < beside).map_or(random, |released| released.T.rows[i].0[k]);
             }
         }
+        // W ← K⁻¹ M W, with the products of T that the released pencil needs.
         let mut MW = Block::zeros(rows, W.width);
         (pencil.mass)(&W, &mut MW);
         let sizes2 = W.gram(&MW).diagonal();
@@ -264,6 +265,7 @@ impl Basis {
         drop((newest, mass_newest));
         blocks.extend(T.cloned());
         let vectors = projected.nrows() + T.map_or(0, |T| T.width);
+        // Shapes V s, a block of columns at a time.
         let mut factors = Vec::new();
         for (ritz, count) in of {
             for first in (0..count).step_by(WIDTH) {
@@ -282,6 +284,7 @@ impl Basis {
                 block.put_columns(&mut shapes, first);
             }
             for mut shape in shapes.column_iter_mut() {
+                // Sign: the largest entry is positive.
                 let peak =
                     shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
                 if peak < 0.0 {
