@@ -17,7 +17,7 @@ pub fn gathered(texts: &[String]) -> Vec<String> {
             None => groups.push((kind, vec![text])),
         }
     }
-    let told = |(_, group): (String, Vec<&String>)| match group.as_slice() {
+    let merged = |(_, group): (String, Vec<&String>)| match group.as_slice() {
         [first, others @ ..] if group.len() >= MANY => {
             let named: Vec<&str> = others.iter().take(NAMED).filter_map(|other| difference(first, other)).collect();
             let more = if others.len() > named.len() && !named.is_empty() { ", ..." } else { "" };
@@ -26,7 +26,7 @@ pub fn gathered(texts: &[String]) -> Vec<String> {
         }
         few => few.iter().map(|text| (*text).clone()).collect(),
     };
-    groups.into_iter().flat_map(told).collect()
+    groups.into_iter().flat_map(merged).collect()
 }
 
 /// Message without its quoted names and numbers.

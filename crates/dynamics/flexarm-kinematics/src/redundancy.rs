@@ -69,7 +69,7 @@ pub fn inverse_kinematics_with_rule(
         if step.amax() < 1e-8 {
             return Ok(RuledSolution { q, measure, steps, settled: true });
         }
-        let mut part = aim.room(&q, &step).min(0.5 / step.amax()).min(1.0);
+        let mut part = aim.largest_part(&q, &step).min(0.5 / step.amax()).min(1.0);
         let mut next = None;
         while next.is_none() && part * step.amax() > 1e-9 {
             let trial = inverse_kinematics(model, data, frame, X_WT, &(&q + &step * part), options);
@@ -143,7 +143,7 @@ impl Aim {
     }
 
     /// Fraction of the step up to the first limit.
-    fn room(&self, q: &DVector<f64>, step: &DVector<f64>) -> f64 {
+    fn largest_part(&self, q: &DVector<f64>, step: &DVector<f64>) -> f64 {
         let part = |i: &AimedCoordinate| match step[i.k] {
             d if d > 0.0 => (i.upper - q[i.k]) / d,
             d if d < 0.0 => (i.lower - q[i.k]) / d,

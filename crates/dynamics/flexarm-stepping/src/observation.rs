@@ -93,8 +93,8 @@ pub(crate) fn observe_reduced(
     let [mut damping, elastic] = match gears {
         Some(gears) => [gears.loads(plant, &mut out.load), gears.energy(plant)],
         None => {
-            let rooms = [system.shifted.as_mut_slice(), system.forces.as_mut_slice()];
-            element_loads(plant, e, rates, rooms, &mut out.load)
+            let workspaces = [system.shifted.as_mut_slice(), system.forces.as_mut_slice()];
+            element_loads(plant, e, rates, workspaces, &mut out.load)
         }
     };
     for k in 0..n {
@@ -109,25 +109,25 @@ pub(crate) fn observe_reduced(
         data.V[load.body].power(&F)
     });
     out.power = [out.drive.dot(&out.qdot.rows(0, n)), loads.sum(), damping];
-    out.impulse_work = system.struck;
+    out.impulse_work = system.impulse_work;
     out.energy = [kinetic, potential, elastic];
 }
 
 /// Writes the loads `-(K e + D ė)` of the elements (first six components). Returns the power
 /// dissipated by the dampers, `ėᵀ D ė` (W), and the elastic energy (J).
 ///
-/// * `rooms`: scratch, at least one number per elastic coordinate each.
+/// * `workspaces`: scratch, at least one number per elastic coordinate each.
 fn element_loads(
     plant: &Plant,
     e: &[f64],
     rates: &[f64],
-    rooms: [&mut [f64]; 2],
+    workspaces: [&mut [f64]; 2],
     loads: &mut [Vector6<f64>],
 ) -> [f64; 2] {
     if rates.is_empty() {
         return [0.0; 2];
     }
-    let [dampers, springs] = rooms.map(|room| &mut room[..rates.len()]);
+    let [dampers, springs] = workspaces.map(|workspace| &mut workspace[..rates.len()]);
     dampers.fill(0.0);
     springs.fill(0.0);
     // D ė, then per element K e, its energy and -(K e + D ė).

@@ -346,7 +346,7 @@ pub struct TreeInverse {
     plain: Elimination<1>,
     corrected: Elimination<2>,
     /// `I^-1`, for (3).
-    lightness: Vec<Matrix6<f64>>,
+    inverse_inertia: Vec<Matrix6<f64>>,
     /// α of each node in (3).
     alpha: Vec<Vector6<f64>>,
     /// `s M^-1 K d` of the last solution d.
@@ -372,12 +372,12 @@ impl TreeInverse {
 
     fn invert_inertias(&mut self, t: f64) -> Result<(), StepError> {
         let nodes = &self.matrices.nodes;
-        self.lightness.resize(nodes.len(), Matrix6::zeros());
+        self.inverse_inertia.resize(nodes.len(), Matrix6::zeros());
         self.alpha.resize(nodes.len(), Vector6::zeros());
         if self.shift.len() != 6 * nodes.len() {
             self.shift = DVector::zeros(6 * nodes.len());
         }
-        for (inverse, node) in self.lightness.iter_mut().zip(nodes) {
+        for (inverse, node) in self.inverse_inertia.iter_mut().zip(nodes) {
             let mut inertia = [[node.inertia]];
             if !invert(&mut inertia) {
                 return Err(StepError::Singular { matrix: "mass matrix", t });
@@ -412,7 +412,7 @@ impl TreeInverse {
 
     /// Computes `y = x + s M^-1 K x`, by (3).
     pub fn correct(&mut self, x: &DVector<f64>, y: &mut DVector<f64>) {
-        let Self { matrices, s, lightness, alpha, .. } = self;
+        let Self { matrices, s, inverse_inertia, alpha, .. } = self;
         let s = s.unwrap_or(0.0);
         // Inward pass: accumulate the forces from the children.
         alpha.iter_mut().for_each(|alpha| *alpha = Vector6::zeros());
@@ -422,7 +422,7 @@ impl TreeInverse {
                 let carried = node.inward(&f);
                 alpha[p] += carried;
             }
-            alpha[j] = product(&lightness[j], &(f - alpha[j]));
+            alpha[j] = product(&inverse_inertia[j], &(f - alpha[j]));
         }
         for (j, node) in matrices.nodes.iter().enumerate() {
             let moved = node.parent.map_or(Vector6::zeros(), |p| node.outward(&alpha[p]));

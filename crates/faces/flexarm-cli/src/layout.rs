@@ -152,12 +152,12 @@ pub fn columns(text: &str) -> usize {
     text.chars().count()
 }
 
-/// Shortens the text to at most `room` columns.
-fn shortened(text: &str, room: usize) -> String {
-    if columns(text) <= room {
+/// Shortens the text to at most `width_left` columns.
+fn shortened(text: &str, width_left: usize) -> String {
+    if columns(text) <= width_left {
         return text.to_owned();
     }
-    text.chars().take(room.saturating_sub(1)).chain(['…']).collect()
+    text.chars().take(width_left.saturating_sub(1)).chain(['…']).collect()
 }
 
 /// Splits text at blanks into lines of at most `width` columns.

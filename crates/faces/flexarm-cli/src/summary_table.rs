@@ -56,10 +56,10 @@ pub fn summary(summary: &Summary, width: usize) -> String {
             let value = format!("{}{}", " ".repeat(values - columns(&row.value)), row.value);
             let unit = format!("{}{}", row.unit, " ".repeat(units - columns(row.unit)));
             let before = columns(&name) + 2 + columns(&value) + 1 + columns(&unit) + 2;
-            let room = width.saturating_sub(before);
+            let width_left = width.saturating_sub(before);
             // Notes get separate lines if their column would be too narrow.
-            let (indent, room) = if room < 20 { (4, width - 4) } else { (before, room) };
-            let mut notes = wrapped(&row.note, room).into_iter();
+            let (indent, width_left) = if width_left < 20 { (4, width - 4) } else { (before, width_left) };
+            let mut notes = wrapped(&row.note, width_left).into_iter();
             let first = if indent == before { notes.next().unwrap_or_default() } else { String::new() };
             let text = format!("{name}  {value} {unit}");
             out += &match first.is_empty() {
@@ -150,8 +150,8 @@ fn plot(summary: &Summary, width: usize) -> String {
     for (row, line) in grid.iter().enumerate() {
         let (label, tick) = if row == 0 { (label.as_str(), '┤') } else { ("", '│') };
         let line: String = line.iter().map(|bits| char::from_u32(0x2800 + u32::from(*bits)).unwrap_or(' ')).collect();
-        let room = margin - 2;
-        out += &format!("  {label:>room$} {tick}{HEADLINE}{line}{HEADLINE:#}\n");
+        let width_left = margin - 2;
+        out += &format!("  {label:>width_left$} {tick}{HEADLINE}{line}{HEADLINE:#}\n");
     }
     // The axis is thick while the robot moves.
     let span = summary.duration_s.max(1e-12);
@@ -164,8 +164,8 @@ fn plot(summary: &Summary, width: usize) -> String {
     out += &format!("  {:>left$} └{axis}\n", 0);
     let end = format!("{span:.2} s");
     let key = if summary.moves_s.is_empty() { "" } else { "━ moves" };
-    let room = cells.saturating_sub(1 + columns(&end));
-    out += &format!("{}0{FAINT}{key:^room$}{FAINT:#}{end}\n", " ".repeat(margin + 2));
+    let width_left = cells.saturating_sub(1 + columns(&end));
+    out += &format!("{}0{FAINT}{key:^width_left$}{FAINT:#}{end}\n", " ".repeat(margin + 2));
     out
 }
 

@@ -76,7 +76,7 @@ fn models() -> [(&'static str, Modelling); 4] {
     [("two parts", lumped(2)), ("four parts", lumped(4)), ("two modes", modal(2)), ("six modes", modal(6))]
 }
 
-/// Stress (Pa) of every seat of the rigid link at angle q, rate and acceleration: its fields under its
+/// Stress (Pa) of every site of the rigid link at angle q, rate and acceleration: its fields under its
 /// own inertia and that of the disc at its end.
 fn stress_by_hand(fields: &StressFields, [q, rate, acceleration]: [f64; 3]) -> Vec<[f64; 6]> {
     let (omega, alpha) = (Vector3::y() * rate, Vector3::y() * acceleration);
@@ -95,13 +95,13 @@ fn stress_by_hand(fields: &StressFields, [q, rate, acceleration]: [f64; 3]) -> V
         let amplitudes = wrench.iter().chain(&loads);
         amplitudes.enumerate().map(|(j, amplitude)| f64::from(row[j]) * amplitude).sum()
     };
-    (0..fields.seats.len()).map(|k| std::array::from_fn(|c| component(k, c))).collect()
+    (0..fields.sites.len()).map(|k| std::array::from_fn(|c| component(k, c))).collect()
 }
 
 /// Maximum von Mises stress of [`stress_by_hand`] that is not near a tie.
 fn by_hand(fields: &StressFields, clear: f64, motion: [f64; 3]) -> f64 {
-    let stress = stress_by_hand(fields, motion).into_iter().zip(&fields.seats);
-    stress.filter(|(_, seat)| seat.from_tie >= clear).map(|(stress, _)| von_mises(stress)).fold(0.0, f64::max)
+    let stress = stress_by_hand(fields, motion).into_iter().zip(&fields.sites);
+    stress.filter(|(_, site)| site.from_tie >= clear).map(|(stress, _)| von_mises(stress)).fold(0.0, f64::max)
 }
 
 #[test]
@@ -115,7 +115,7 @@ fn a_held_link_has_the_stress_of_its_weight_whatever_its_model() {
         let off = link.worst[0].von_mises_pa / truth - 1.0;
         println!("{name}: {:.4} MPa, off by {off:.1e}", 1e-6 * link.worst[0].von_mises_pa);
         assert!(off.abs() < 3e-4, "{name}: {off:e}"); // the deflection turns the link by 1e-4
-        assert_eq!(link.nodes, fields.seats.len());
+        assert_eq!(link.nodes, fields.sites.len());
         let place = &link.worst[0];
         assert!((place.of_yield.unwrap() * 250e6 / place.von_mises_pa - 1.0).abs() < 1e-12);
         assert_eq!(place.material.as_deref(), Some("EN AW-6082 T6"));
@@ -180,21 +180,21 @@ fn stress_files_that_do_not_fit_are_refused_and_steppers_without_accelerations_s
 }
 
 /// The arm with a rosette and a stress point in the middle, away from ties and edges, at the returned
-/// seat.
+/// site.
 fn gauged(name: &str) -> (Arm, usize) {
     let arm = Arm::new(name);
     let fields = arm.fields();
     let middle = fields.poses[1].translation.vector * 0.5;
-    let clear: Vec<usize> = (0..fields.seats.len()).filter(|k| fields.seats[*k].from_tie > 0.2).collect();
-    let from = |k: usize| (fields.seats[k].position - middle).norm();
-    let seat = clear.into_iter().min_by(|a, b| from(*a).total_cmp(&from(*b))).unwrap();
-    let [x, y, z] = fields.seats[seat].position.into();
+    let clear: Vec<usize> = (0..fields.sites.len()).filter(|k| fields.sites[*k].from_tie > 0.2).collect();
+    let from = |k: usize| (fields.sites[k].position - middle).norm();
+    let site = clear.into_iter().min_by(|a, b| from(*a).total_cmp(&from(*b))).unwrap();
+    let [x, y, z] = fields.sites[site].position.into();
     let at = format!("link = \"lower_arm\"\nat = [{x}, {y}, {z}]\n");
     let arm = arm.with(&format!(
         "[[strain_gauge]]\nname = \"rosette\"\n{at}direction = [0.0, 0.0, 1.0]\nangles_deg = [0, 45, 90]\n\
          [[stress_point]]\nname = \"eye\"\n{at}"
     ));
-    (arm, seat)
+    (arm, site)
 }
 
 /// Truth: a run outside the study.
@@ -223,7 +223,7 @@ fn studies_take_gauges_and_stress_points_as_metrics() {
 
 #[test]
 fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up() {
-    let (arm, seat) = gauged("gauges");
+    let (arm, site) = gauged("gauges");
     let fields = arm.fields();
     for (name, modelling) in models() {
         let run = arm.record(|_| 1.2, 0.01, modelling);
@@ -233,13 +233,13 @@ fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up(
         let gauge = run.columns.column("gauge").unwrap();
         let read = &gauge.values[gauge.values.len() - 6..];
 
-        let stress = stress_by_hand(&fields, [1.2, 0.0, 0.0])[seat];
+        let stress = stress_by_hand(&fields, [1.2, 0.0, 0.0])[site];
         let [xx, yy, zz, xy, yz, zx] = stress;
         let sigma = Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz);
         let (E, nu) = (70e9, 0.33);
         assert_eq!((fields.materials[0].E, fields.materials[0].nu), (E, nu));
         let epsilon = (sigma * (1.0 + nu) - Matrix3::identity() * (nu * sigma.trace())) / E;
-        let n = fields.normal(seat);
+        let n = fields.normal(site);
         let along = (Vector3::z() - n * n.z).normalize();
         let across = n.cross(&along);
         let truth = [along, (along + across).normalize(), across].map(|d| d.dot(&(epsilon * d)));
@@ -258,7 +258,7 @@ fn a_strain_gauge_reads_hookes_law_of_the_stress_below_it_and_a_rosette_adds_up(
         assert_eq!(link.gauges.len(), 3);
         assert!((link.gauges[0].highest / read[0] - 1.0).abs() < 1e-3, "{:?}", link.gauges[0]);
         assert!((link.points[0].place.von_mises_pa / read[3].abs() - 1.0).abs() < 1e-3, "{:?}", link.points[0]);
-        assert_eq!(link.points[0].place.node, fields.seats[seat].node);
+        assert_eq!(link.points[0].place.node, fields.sites[site].node);
     }
 }
 
@@ -302,12 +302,12 @@ fn gauges_of_a_live_arm_read_what_those_of_a_run_read() {
 fn gauges_that_are_not_on_a_link_with_stress_are_refused_with_the_place() {
     let arm = Arm::new("misplaced gauges");
     let file = std::fs::read_to_string(arm.folder.join("robot.toml")).unwrap();
-    let seat = arm.fields().seats[0].position;
+    let site = arm.fields().sites[0].position;
     let gauge = |name: &str, link: &str, at: [f64; 3], rest: &str| {
         let [x, y, z] = at;
         format!("[[strain_gauge]]\nname = \"{name}\"\nlink = \"{link}\"\nat = [{x}, {y}, {z}]\n{rest}\n")
     };
-    let (on, along) = (<[f64; 3]>::from(seat), "direction = [0.0, 0.0, 1.0]");
+    let (on, along) = (<[f64; 3]>::from(site), "direction = [0.0, 0.0, 1.0]");
     let load = |entries: String| {
         std::fs::write(arm.folder.join("robot.toml"), format!("{file}\n{entries}")).unwrap();
         let robot = Robot::load(&arm.folder)?;
@@ -361,8 +361,8 @@ fn statics_give_the_stress_of_a_held_link_with_a_load_on_the_tool() {
             let by = |c: usize| (0..6).map(|j| f64::from(fields.stress[(6 * k + c, j)]) * wrench[j]).sum::<f64>();
             std::array::from_fn(|c| stress[c] + by(c))
         };
-        let stress = stress_by_hand(&fields, [q, 0.0, 0.0]).into_iter().enumerate().map(at_seat).zip(&fields.seats);
-        let far = stress.filter(|(_, seat)| seat.from_tie >= link.clear_of_ties_m);
+        let stress = stress_by_hand(&fields, [q, 0.0, 0.0]).into_iter().enumerate().map(at_seat).zip(&fields.sites);
+        let far = stress.filter(|(_, site)| site.from_tie >= link.clear_of_ties_m);
         let truth = far.map(|(stress, _)| von_mises(stress)).fold(0.0, f64::max);
         let pulled = robot.model(&modelling).unwrap().statics(Some(&[q]), [0.0, 0.0, -1000.0, 0.0, 0.0, 0.0]).unwrap();
         let off = pulled.stress[0].peak_pa / truth - 1.0;

@@ -83,9 +83,9 @@ fn the_stress_of_a_bracket_is_that_of_calculix_at_points_and_nodes() {
     for (load, j) in LOADS {
         let k = column(&format!("{load}_mises"));
         let largest = rows.iter().map(|row| row[k]).fold(0.0, f64::max);
-        let off = fields.seats.iter().enumerate().map(|(i, seat)| {
+        let off = fields.sites.iter().enumerate().map(|(i, site)| {
             let own = von_mises(std::array::from_fn(|c| f64::from(fields.stress[(6 * i + c, j)])));
-            (own - by_node[&seat.node][k]).abs() / largest
+            (own - by_node[&site.node][k]).abs() / largest
         });
         let off = off.fold(0.0, f64::max);
         eprintln!("{load}: nodal von Mises {off:.1e} of the largest");
@@ -97,11 +97,11 @@ fn the_stress_of_a_bracket_is_that_of_calculix_at_points_and_nodes() {
         serde_json::from_str(&std::fs::read_to_string(folder.join("truth.json")).unwrap()).unwrap();
     for (name, gauge) in truth["given_mesh"]["gauges"].as_object().unwrap() {
         let numbers = |key: &str| Vector3::from_fn(|c, _| gauge[key][c].as_f64().unwrap());
-        let seat = fields.nearest_seat(&numbers("xyz")).unwrap();
-        assert_eq!(fields.seats[seat].node, gauge["node"].as_u64().unwrap());
-        let normal = fields.normal(seat).angle(&numbers("normal"));
+        let site = fields.nearest_site(&numbers("xyz")).unwrap();
+        assert_eq!(fields.sites[site].node, gauge["node"].as_u64().unwrap());
+        let normal = fields.normal(site).angle(&numbers("normal"));
         let grids = [0.0, 90.0, 45.0]
-            .map(|angle: f64| fields.strain_by_stress(seat, &numbers("along"), angle.to_radians()).unwrap());
+            .map(|angle: f64| fields.strain_by_stress(site, &numbers("along"), angle.to_radians()).unwrap());
         let mut worst = 0.0_f64;
         for (load, j) in LOADS.into_iter().filter(|(load, _)| *load != "mode_1") {
             let stress = fields.stress.column(j);
@@ -110,7 +110,7 @@ fn the_stress_of_a_bracket_is_that_of_calculix_at_points_and_nodes() {
             let sign = if load.starts_with("accel") { -1.0 } else { 1.0 };
             let scale = truth.iter().fold(0.0_f64, |most, strain| most.max(strain.abs()));
             for (by, truth) in grids.iter().zip(truth) {
-                let own: f64 = (0..6).map(|c| by[c] * f64::from(stress[6 * seat + c])).sum();
+                let own: f64 = (0..6).map(|c| by[c] * f64::from(stress[6 * site + c])).sum();
                 worst = worst.max((sign * own - truth).abs() / scale);
             }
         }

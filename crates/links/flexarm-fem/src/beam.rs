@@ -127,7 +127,7 @@ impl Beam {
             K[(row, row + 6)] = -k;
             K[(row + 6, row)] = -k;
         }
-        // Bending in each plane with shear: f = EI / (l³ (1 + φ)), φ = 12 EI / (G A_s l²).
+        // Bending in each plane with shear: f = EI / (l³ (1 + φ)), φ = 12 EI / (kGA l²).
         for plane in self.planes() {
             let phi = plane.phi;
             let f = plane.EI / (l.powi(3) * (1.0 + phi));

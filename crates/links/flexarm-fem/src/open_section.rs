@@ -94,8 +94,8 @@ impl Open {
         (0.5 * b * flange * (h - flange) + 0.5 * web * half * half) / (own.I_y * web)
     }
 
-    /// `room`: overhang of a flange beyond the web on one side, m.
-    fn check(&self, room: f64) -> Result<(), FemError> {
+    /// `overhang`: of a flange beyond the web on one side, m.
+    fn check(&self, overhang: f64) -> Result<(), FemError> {
         let lengths = [("width (m)", self.width), ("height (m)", self.height), ("web thickness (m)", self.web)];
         for (what, length) in lengths {
             positive(what, length)?;
@@ -107,9 +107,9 @@ impl Open {
         };
         below("web thickness (m)", self.web, self.width, "the width")?;
         below("flange thickness (m)", self.flange, 0.5 * self.height, "half the height")?;
-        let room = room.min(0.5 * self.height - self.flange);
-        if !(0.0..=room).contains(&self.fillet) {
-            let allowed = format!("from 0 to what is free beside the web and between the flanges, {room}");
+        let overhang = overhang.min(0.5 * self.height - self.flange);
+        if !(0.0..=overhang).contains(&self.fillet) {
+            let allowed = format!("from 0 to what is free beside the web and between the flanges, {overhang}");
             return Err(FemError::OutOfRange { what: "fillet radius (m)".into(), found: self.fillet, allowed });
         }
         Ok(())

@@ -46,11 +46,11 @@ pub(crate) struct Assembled {
 /// * `file`: file name for caveats.
 /// * `has_clock`: whether the times of reception are known.
 pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Assembled, PlacedProblem> {
-    let mut told = FileCaveats { file, caveats: Vec::new() };
+    let mut caveats = FileCaveats { file, caveats: Vec::new() };
     let mut lines = if topic.received.is_empty() {
-        states(topic, has_clock, &mut told)?
+        states(topic, has_clock, &mut caveats)?
     } else {
-        plans(topic, has_clock, &mut told)?
+        plans(topic, has_clock, &mut caveats)?
     };
     let samples = lines.iter().map(|line| line.t.len()).max().unwrap_or(0);
     let first = lines.iter().filter_map(|line| line.t.first()).fold(f64::INFINITY, |first, t| first.min(*t));
@@ -60,10 +60,10 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
         return Err(PlacedProblem::from(TrajectoryError::Samples(SampleError::TooFew { found })));
     }
     lines.iter_mut().for_each(|line| line.reach(first, last));
-    tell_ends(&lines, first, last, &mut told);
+    tell_ends(&lines, first, last, &mut caveats);
     let parts = lines.iter().map(|line| line.curve(first, last)).collect::<Result<Vec<_>, _>>()?;
     let trajectory = Trajectory::side_by_side(&parts)?;
-    Ok(Assembled { trajectory, samples, caveats: told.caveats })
+    Ok(Assembled { trajectory, samples, caveats: caveats.caveats })
 }
 
 /// Collects caveats about one file.
@@ -148,7 +148,7 @@ impl Line {
 
 /// Warns about joints that start later or end earlier than others by more than two of their own
 /// steps.
-fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut FileCaveats<'_>) {
+fn tell_ends(lines: &[Line], first: f64, last: f64, caveats: &mut FileCaveats<'_>) {
     let mut late = Vec::new();
     for line in lines.iter().filter(|line| line.t.len() > 1) {
         let (begin, end) = (line.t[0], line.t[line.t.len() - 1]);
@@ -159,11 +159,11 @@ fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut FileCaveats<'_>) 
     }
     if !late.is_empty() {
         let what = format!("joints that are not recorded all the time are held before and after: {}", late.join(", "));
-        told.warn("motion-ends", &what, "cut the recording to the time that all joints share");
+        caveats.warn("motion-ends", &what, "cut the recording to the time that all joints share");
     }
     let once: Vec<String> = lines.iter().filter(|line| line.t.len() == 1).map(|line| line.joint.clone()).collect();
     if !once.is_empty() {
-        told.note("motion-ends", &format!("recorded only once, and held there: {}", list(&once)));
+        caveats.note("motion-ends", &format!("recorded only once, and held there: {}", list(&once)));
     }
 }
 
@@ -171,16 +171,16 @@ fn tell_ends(lines: &[Line], first: f64, last: f64, told: &mut FileCaveats<'_>) 
 // states
 
 /// Lines of joints from their states.
-fn states(mut topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
+fn states(mut topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
     let count: usize = topic.series.iter().map(|series| series.position.len()).sum();
     if topic.without_position > 0 {
         let what = format!("{} of {} messages have no positions and are left out", topic.without_position, topic.count);
-        told.warn("motion-positions", &what, "");
+        caveats.warn("motion-positions", &what, "");
     }
     if topic.odd_rates > 0 {
         let what =
             format!("the velocities of {} messages are not one for each joint and are left out", topic.odd_rates);
-        told.warn("motion-velocities", &what, "");
+        caveats.warn("motion-velocities", &what, "");
     }
     let mut not_finite = 0;
     for series in &mut topic.series {
@@ -192,9 +192,9 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Resu
     }
     if not_finite > 0 {
         let what = format!("{not_finite} of {count} positions are not numbers and are skipped; the curves bridge them");
-        told.warn("motion-positions", &what, "look at the recording: a robot that is not connected says so");
+        caveats.warn("motion-positions", &what, "look at the recording: a robot that is not connected says so");
     }
-    let use_log = clock(&topic.series, has_clock, told)?;
+    let use_log = clock(&topic.series, has_clock, caveats)?;
     let origin = |series: &Series| series.times(use_log).iter().copied().min().unwrap_or(i64::MAX);
     let origin = topic.series.iter().map(origin).min().unwrap_or(0);
 
@@ -208,7 +208,7 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Resu
         lines.push(line);
     }
     if sorted > 0 {
-        told.note(
+        caveats.note(
             "motion-stamps",
             &format!("{sorted} samples came out of order and were put in order by their stamps"),
         );
@@ -219,12 +219,12 @@ fn states(mut topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Resu
              {differ:.3e} rad or m)"
         );
         if differ > 0.0 {
-            told.warn("motion-stamps", &what, "")
+            caveats.warn("motion-stamps", &what, "")
         } else {
-            told.note("motion-stamps", &what)
+            caveats.note("motion-stamps", &what)
         };
     }
-    judge_velocities(&mut lines, told);
+    judge_velocities(&mut lines, caveats);
     Ok(lines)
 }
 
@@ -281,7 +281,7 @@ impl Series {
 }
 
 /// Whether the times of reception are used instead of the stamps; a caveat gives the choice.
-fn clock(series: &[Series], has_clock: bool, told: &mut FileCaveats<'_>) -> Result<bool, PlacedProblem> {
+fn clock(series: &[Series], has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result<bool, PlacedProblem> {
     let total: usize = series.iter().map(|series| series.stamp_ns.len()).sum();
     let unset: usize = series.iter().map(|series| series.stamp_ns.iter().filter(|stamp| **stamp == 0).count()).sum();
     let mut back: Option<(f64, usize, &str)> = None;
@@ -312,12 +312,12 @@ fn clock(series: &[Series], has_clock: bool, told: &mut FileCaveats<'_>) -> Resu
     match (why, has_clock, back) {
         (None, ..) => {
             if has_clock {
-                told.note("motion-clock", "times are those of the header stamps, not those of reception");
+                caveats.note("motion-clock", "times are those of the header stamps, not those of reception");
             }
             Ok(false)
         }
         (Some(why), true, _) => {
-            told.warn("motion-clock", &format!("times are those of reception: {why}"), "");
+            caveats.warn("motion-clock", &format!("times are those of reception: {why}"), "");
             Ok(true)
         }
         (_, false, _) if unset == total && total > series.len() => Err(PlacedProblem::new(Problem::NoStamps)),
@@ -325,7 +325,7 @@ fn clock(series: &[Series], has_clock: bool, told: &mut FileCaveats<'_>) -> Resu
             Err(PlacedProblem::new(Problem::StampsJumpBack { seconds, number, joint: joint.to_owned() }))
         }
         (Some(why), false, None) => {
-            told.warn("motion-clock", &format!("{why}; there is no other time to go by"), "");
+            caveats.warn("motion-clock", &format!("{why}; there is no other time to go by"), "");
             Ok(false)
         }
     }
@@ -333,7 +333,7 @@ fn clock(series: &[Series], has_clock: bool, told: &mut FileCaveats<'_>) -> Resu
 
 /// Discards velocities that do not match the slopes of the positions, since drivers without
 /// velocities send zeros.
-fn judge_velocities(lines: &mut [Line], told: &mut FileCaveats<'_>) {
+fn judge_velocities(lines: &mut [Line], caveats: &mut FileCaveats<'_>) {
     let (mut foreign, mut partial) = (Vec::new(), Vec::new());
     for line in lines.iter_mut().filter(|line| line.t.len() > 1) {
         let known = line.v.iter().filter(|v| v.is_finite()).count();
@@ -356,15 +356,15 @@ fn judge_velocities(lines: &mut [Line], told: &mut FileCaveats<'_>) {
             "velocities that are not those of the positions are not used (mean difference and mean slope): {}",
             foreign.join(", ")
         );
-        told.warn("motion-velocities", &what, "");
+        caveats.warn("motion-velocities", &what, "");
     }
-    tell_partial(&partial, told);
+    tell_partial(&partial, caveats);
 }
 
-fn tell_partial(partial: &[String], told: &mut FileCaveats<'_>) {
+fn tell_partial(partial: &[String], caveats: &mut FileCaveats<'_>) {
     if !partial.is_empty() {
         let what = format!("rates that are not numbers at every sample are not used: {}", partial.join(", "));
-        told.warn("motion-velocities", &what, "");
+        caveats.warn("motion-velocities", &what, "");
     }
 }
 
@@ -373,7 +373,7 @@ fn tell_partial(partial: &[String], told: &mut FileCaveats<'_>) {
 
 /// Lines of joints from the points of trajectories. Each message begins at its stamp, otherwise at
 /// its reception, otherwise after the previous one, and replaces the remainder of the previous one.
-fn plans(topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
+fn plans(topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
     let mut lines: Vec<Line> =
         topic.series.iter().map(|series| Line { joint: series.joint.clone(), ..Line::default() }).collect();
     let messages: Vec<&Received> =
@@ -393,7 +393,7 @@ fn plans(topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Result<Ve
             return Err(PlacedProblem::new(Problem::StampsJumpBack { seconds, number: k + 1, joint }));
         }
         if k == 0 {
-            put_start(message, &mut lines, told);
+            put_start(message, &mut lines, caveats);
         }
         let mut from = begin;
         for (i, points) in message.trajectories.iter().enumerate() {
@@ -409,15 +409,15 @@ fn plans(topic: Topic, has_clock: bool, told: &mut FileCaveats<'_>) -> Result<Ve
         }
         end = from;
     }
-    tell_plan(&messages, by_stamp, has_clock, segments, told);
+    tell_plan(&messages, by_stamp, has_clock, segments, caveats);
     lines.retain(|line| !line.t.is_empty());
-    judge_plan(&mut lines, told);
+    judge_plan(&mut lines, caveats);
     Ok(lines)
 }
 
 /// Adds the position of the robot before the first point, if it is given and the first point is
 /// later.
-fn put_start(message: &Received, lines: &mut [Line], told: &mut FileCaveats<'_>) {
+fn put_start(message: &Received, lines: &mut [Line], caveats: &mut FileCaveats<'_>) {
     let Some(points) = message.trajectories.iter().find(|points| !points.points.is_empty()) else { return };
     let first = points.points.first().map_or(0.0, |point| point.time_s);
     if first <= 0.0 {
@@ -435,14 +435,15 @@ fn put_start(message: &Received, lines: &mut [Line], told: &mut FileCaveats<'_>)
             for (line, q) in lines.iter_mut().zip(places) {
                 line.push(0.0, q, 0.0, 0.0);
             }
-            told.note("motion-start", &format!("the robot goes from trajectory_start to the first point in {first} s"));
+            caveats
+                .note("motion-start", &format!("the robot goes from trajectory_start to the first point in {first} s"));
         }
         None => {
             let what = format!(
                 "the first point is at {first} s, and where the robot is before is not in the file: the motion begins with \
                  that point"
             );
-            told.note("motion-start", &what);
+            caveats.note("motion-start", &what);
         }
     }
 }
@@ -505,7 +506,7 @@ impl Line {
     }
 }
 
-fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: usize, told: &mut FileCaveats<'_>) {
+fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: usize, caveats: &mut FileCaveats<'_>) {
     if messages.len() > 1 {
         let begin = match (by_stamp, has_clock) {
             (true, _) => "its header stamp",
@@ -516,14 +517,14 @@ fn tell_plan(messages: &[&Received], by_stamp: bool, has_clock: bool, segments: 
             "{} trajectories: each begins at {begin} and replaces the rest of the previous one",
             messages.len()
         );
-        told.warn("motion-messages", &what, "");
+        caveats.warn("motion-messages", &what, "");
     } else if segments > 1 {
-        told.note("motion-messages", &format!("{segments} trajectories of one message run one after another"));
+        caveats.note("motion-messages", &format!("{segments} trajectories of one message run one after another"));
     }
 }
 
 /// Chooses the rates of the points that are used.
-fn judge_plan(lines: &mut [Line], told: &mut FileCaveats<'_>) {
+fn judge_plan(lines: &mut [Line], caveats: &mut FileCaveats<'_>) {
     let mut partial = Vec::new();
     let mut without = true;
     for line in lines {
@@ -536,10 +537,10 @@ fn judge_plan(lines: &mut [Line], told: &mut FileCaveats<'_>) {
             }
         }
     }
-    tell_partial(&partial, told);
+    tell_partial(&partial, caveats);
     if without {
         let what = "the points have no velocities: the joints follow a smooth spline through them, where a controller of ROS goes \
              straight from point to point";
-        told.note("motion-velocities", what);
+        caveats.note("motion-velocities", what);
     }
 }

@@ -13,7 +13,7 @@ pub(crate) struct JerkBounded {
     /// Jerk limit by joint, infinite for joints at rest.
     pub(crate) jerks: Vec<f64>,
     /// Names of the joints with a given jerk limit.
-    pub(crate) told: Vec<Option<String>>,
+    pub(crate) given: Vec<Option<String>>,
 }
 
 impl JerkBounded {
@@ -39,7 +39,7 @@ impl JerkBounded {
         let mut limits = Limits::new(route, arm, Some(rise));
         let law = least_time_with_jerks(&law, &s, shortest, &mut |k, s| limits.at(k, s));
         let name = |k: usize| arm.model.coordinates()[k].joint.clone();
-        let told = (0..arm.bounds.len()).map(|k| arm.bounds[k].jerk.map(|_| name(k))).collect();
-        Ok(Self { law, jerks, told })
+        let given = (0..arm.bounds.len()).map(|k| arm.bounds[k].jerk.map(|_| name(k))).collect();
+        Ok(Self { law, jerks, given })
     }
 }

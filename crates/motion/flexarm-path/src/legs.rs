@@ -281,9 +281,12 @@ impl<'m> Legs<'m> {
         let mut data = Data::new(model);
         let options = IkOptions::default();
         let wanted = inverse_kinematics_with_rule(model, &mut data, &way.frame, &X1, q1, &options, &rule).ok()?.q;
-        let room = left_over.iter().map(|&k| self.room(of, k, length) / (wanted[k] - q0[k]).abs()).fold(1.0, f64::min);
-        let mut part = room;
-        while part * room > SMALLEST_PART {
+        let largest_part = left_over
+            .iter()
+            .map(|&k| self.largest_change(of, k, length) / (wanted[k] - q0[k]).abs())
+            .fold(1.0, f64::min);
+        let mut part = largest_part;
+        while part * largest_part > SMALLEST_PART {
             let joint = |&k: &usize| {
                 let to = q0[k] + part * (wanted[k] - q0[k]);
                 GuidedJoint { k, from: [q0[k], 0.0, 0.0], to: [to, 0.0, 0.0] }
@@ -299,7 +302,7 @@ impl<'m> Legs<'m> {
 
     /// Maximum change of a redundant joint along a path that does not slow the tool: a fifth of its
     /// velocity and acceleration limits.
-    fn room(&self, of: &Move, k: usize, length: f64) -> f64 {
+    fn largest_change(&self, of: &Move, k: usize, length: f64) -> f64 {
         // Peak derivatives of the quintic from rest to rest over its length.
         const RATE: f64 = 1.875;
         const SECOND: f64 = 5.7735;

@@ -144,22 +144,22 @@ impl<'r> Schedule<'r> {
             error @ LawError::Points(_) => fail(error.to_string()),
         })?;
         let mut schedule = Self { route, law: law.0, stretch: law.1, programmed, caps };
-        schedule.stretch *= schedule.told_duration(&fail)?;
+        schedule.stretch *= schedule.given_duration(&fail)?;
         Ok(schedule)
     }
 
     /// Factor by which the motion must be slower for the durations that the program gives.
-    fn told_duration(&self, fail: &dyn Fn(String) -> PathError) -> Result<f64, PathError> {
-        let told: Vec<f64> = self.route.legs.iter().filter_map(|leg| leg.of.speed.duration_s).collect();
-        if told.is_empty() {
+    fn given_duration(&self, fail: &dyn Fn(String) -> PathError) -> Result<f64, PathError> {
+        let given: Vec<f64> = self.route.legs.iter().filter_map(|leg| leg.of.speed.duration_s).collect();
+        if given.is_empty() {
             return Ok(1.0);
         }
-        if told.len() < self.route.legs.len() {
+        if given.len() < self.route.legs.len() {
             return Err(fail(
                 "some moves between two stops have a duration and some have not: give all or none".to_owned(),
             ));
         }
-        let (wanted, least) = (told.iter().sum::<f64>(), self.duration());
+        let (wanted, least) = (given.iter().sum::<f64>(), self.duration());
         if wanted < least * (1.0 - SLACK) {
             let why = format!(
                 "a duration of {wanted} s is given, but the limits of the robot and the rise of its accelerations require at least {least:.4} s"
@@ -419,7 +419,7 @@ impl<'r> Schedule<'r> {
             for (joint, jerk) in jerks.iter().enumerate() {
                 let ratio = (jerk / bounded.jerks[joint]).abs();
                 if ratio > most {
-                    (most, by) = (ratio, bounded.told[joint].as_ref());
+                    (most, by) = (ratio, bounded.given[joint].as_ref());
                 }
             }
         }

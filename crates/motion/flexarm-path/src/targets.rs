@@ -79,14 +79,14 @@ pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
         (Configuration::Kuka { status, turn }, Ok(analytic)) => {
             let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
             // Other bits of the old word do not concern the branch and are kept.
-            let told = analytic.kuka_status(&six, &counted);
-            let status = status.map(|old| told.map_or(old, |told| old & !7 | told));
+            let found = analytic.kuka_status(&six, &counted);
+            let status = status.map(|old| found.map_or(old, |found| old & !7 | found));
             Configuration::Kuka { status, turn: turn.map(|old| old & !63 | kuka_turn(&six, &counted)) }
         }
         (Configuration::Abb { .. }, Ok(analytic)) => {
             let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
-            let told = analytic.abb_configuration(&six, &counted);
-            told.map_or(configuration.clone(), |(quadrants, cfx)| Configuration::Abb { quadrants, cfx })
+            let found = analytic.abb_configuration(&six, &counted);
+            found.map_or(configuration.clone(), |(quadrants, cfx)| Configuration::Abb { quadrants, cfx })
         }
         (Configuration::Near(_), _) => Configuration::Near(arm.axis_values(q)),
         (other, _) => other.clone(),

@@ -29,7 +29,7 @@ pub struct Trajectory {
     /// Notes of the reader or planner; see [`Trajectory::warnings`].
     notes: Vec<Warning>,
     /// Units that the file states for its joints.
-    told: Vec<StatedUnit>,
+    stated: Vec<StatedUnit>,
 }
 
 /// Unit that a file states for a joint: degrees, or metres.
@@ -89,7 +89,7 @@ impl Trajectory {
                 return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: curve.knots[i] });
             }
         }
-        Ok(Self { joints, curves, duration, notes, told: Vec::new() })
+        Ok(Self { joints, curves, duration, notes, stated: Vec::new() })
     }
 
     /// Returns the stored curve of a joint, for programs that save motions: the knots (s), one more
@@ -191,7 +191,7 @@ impl Trajectory {
             curves: order.iter().map(|&i| self.curves[i].clone()).collect(),
             duration: self.duration,
             notes: self.notes.clone(),
-            told: Vec::new(),
+            stated: Vec::new(),
         })
     }
 
@@ -377,10 +377,10 @@ impl Trajectory {
     /// [`TrajectoryError::File`] for a prismatic joint whose values were read as degrees, and for a
     /// revolute one whose values were read as metres.
     pub fn check_units(&self, origin: &str, joints: &[KnownJoint<'_>]) -> Result<(), TrajectoryError> {
-        let contradicts = |told: &StatedUnit| {
-            joints.iter().any(|joint| joint.name == told.joint && joint.is_prismatic != told.is_length)
+        let contradicts = |stated: &StatedUnit| {
+            joints.iter().any(|joint| joint.name == stated.joint && joint.is_prismatic != stated.is_length)
         };
-        let Some(StatedUnit { joint, is_length, line }) = self.told.iter().find(|told| contradicts(told)) else {
+        let Some(StatedUnit { joint, is_length, line }) = self.stated.iter().find(|stated| contradicts(stated)) else {
             return Ok(());
         };
         let problem = Problem::UnitOfJoint { joint: joint.clone(), is_length: *is_length };
@@ -388,8 +388,8 @@ impl Trajectory {
         Err(Box::new(FileError { origin, line: Some(*line), column: None, problem, more_lines }).into())
     }
 
-    pub(crate) fn with_told_units(self, told: Vec<StatedUnit>) -> Self {
-        Self { told, ..self }
+    pub(crate) fn with_stated_units(self, stated: Vec<StatedUnit>) -> Self {
+        Self { stated, ..self }
     }
 
     /// Adds a note of a reader about its file.

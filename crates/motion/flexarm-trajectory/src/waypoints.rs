@@ -49,7 +49,7 @@ use crate::limits::JointLimits;
 use crate::problem::{PlanError, Problem};
 use crate::samples_toml::{self, SamplesFileToml, has_samples};
 use crate::trajectory::Trajectory;
-use crate::waypoints_check::{Checked, check, told_units};
+use crate::waypoints_check::{Checked, check, stated_units};
 use crate::waypoints_toml::FileToml;
 
 impl Trajectory {
@@ -79,7 +79,7 @@ impl Trajectory {
                 return Err(fail(Some(file.format.span().start), Problem::Format { found: *file.format.get_ref() }));
             }
             let read = samples_toml::trajectory(&file).map_err(|error| fail(error.offset, *error.problem))?;
-            return Ok(read.with_told_units(told_units(&file.unit, &file.metres, &file.joints, line)));
+            return Ok(read.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)));
         }
         let file: FileToml = toml::from_str(text).map_err(unread)?;
 
@@ -93,7 +93,7 @@ impl Trajectory {
             TrajectoryError::OutOfRange { joint, .. } => fail(None, Problem::OutOfRange { joint }),
             other => other,
         })?;
-        Ok(planned.with_told_units(told_units(&file.unit, &file.metres, &file.joints, line)))
+        Ok(planned.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)))
     }
 }
 

@@ -102,13 +102,13 @@ pub(crate) fn scales(
 }
 
 /// Units that a file states for its joints, with the lines of the statements.
-pub(crate) fn told_units(
+pub(crate) fn stated_units(
     unit: &Spanned<String>,
     metres: &[Spanned<String>],
     joints: &Spanned<Vec<Spanned<String>>>,
     line: impl Fn(usize) -> usize,
 ) -> Vec<StatedUnit> {
-    let told = |name: &Spanned<String>| {
+    let stated = |name: &Spanned<String>| {
         let joint = name.get_ref().clone();
         match metres.iter().find(|entry| *entry.get_ref() == joint) {
             Some(entry) => Some(StatedUnit { joint, is_length: true, line: line(entry.span().start) }),
@@ -118,7 +118,7 @@ pub(crate) fn told_units(
             None => None,
         }
     };
-    joints.get_ref().iter().filter_map(told).collect()
+    joints.get_ref().iter().filter_map(stated).collect()
 }
 
 fn unknown_joint(entry: &Spanned<String>, key: &'static str, joints: &[String]) -> Located {

@@ -100,11 +100,11 @@ impl SnCurve {
     /// Haibach (2006), *Betriebsfestigkeit*, section 3.2.
     pub fn damage(&self, cycles: &[FatigueCycle]) -> f64 {
         let of_one = |cycle: &FatigueCycle| {
-            let room = 1.0 - cycle.mean.max(0.0) / self.tensile_pa;
-            if room <= 0.0 {
+            let reserve = 1.0 - cycle.mean.max(0.0) / self.tensile_pa;
+            if reserve <= 0.0 {
                 return f64::INFINITY;
             }
-            let ratio = 0.5 * cycle.range / (room * self.amplitude_pa);
+            let ratio = 0.5 * cycle.range / (reserve * self.amplitude_pa);
             let slope = if ratio >= 1.0 { self.slope } else { 2.0 * self.slope - 1.0 };
             cycle.count * ratio.powf(slope) / self.cycles
         };

@@ -109,7 +109,7 @@ impl LongRecord {
 
     /// Reserves memory for a number of samples, up to the number that is kept.
     #[must_use]
-    pub fn with_room(mut self, samples: usize) -> Self {
+    pub fn with_capacity(mut self, samples: usize) -> Self {
         let samples = samples.min(self.most + 1);
         self.times.reserve_exact(samples);
         self.errors.reserve_exact(samples);

@@ -53,7 +53,7 @@ pub(crate) const LEADING: u32 = 14;
 /// Height of a panel of effects.
 const PANEL: u32 = 134;
 /// Space for numbers on the left and below (pixels).
-const ROOM: [u32; 2] = [52, 22];
+const MARGIN: [u32; 2] = [52, 22];
 /// Number of bars of a histogram behind a name.
 const BINS: usize = 14;
 const BIN: RGBColor = RGBColor(201, 214, 228);
@@ -102,8 +102,8 @@ pub fn range(values: impl Iterator<Item = f64>) -> Range<f64> {
         return 0.0..1.0;
     }
     let (span, size) = (high - low, low.abs().max(high.abs()).max(1e-12));
-    let room = if span > 1e-9 * size { 0.05 * span } else { 0.5 * size };
-    low - room..high + room
+    let margin = if span > 1e-9 * size { 0.05 * span } else { 0.5 * size };
+    low - margin..high + margin
 }
 
 /// Draws main effects in rows of panels, one row per result; the panels of a row share their
@@ -116,16 +116,16 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
     let most = |lines: &dyn Fn(&EffectPanel<'_>) -> Vec<String>| {
         LEADING * rows.iter().flatten().map(|panel| lines(panel).len()).max().unwrap_or(1) as u32
     };
-    let (left, height) = (most(&beside) + 4, 12 + PANEL + ROOM[1] + most(&below));
+    let (left, height) = (most(&beside) + 4, 12 + PANEL + MARGIN[1] + most(&below));
     let color = ink(palette::series(0, Ground::Paper));
     let draw = |area: &Area<'_>| {
         for (row, panels) in (0..).zip(rows) {
             let top = 12 + height * row;
             let y = range(panels.iter().flat_map(|panel| panel.points.iter().flat_map(|p| [p[1] - p[2], p[1] + p[2]])));
             for (column, panel) in (0..).zip(panels) {
-                let part = area.clone().shrink((left + width * column, top), (width - 14, PANEL + ROOM[1]));
+                let part = area.clone().shrink((left + width * column, top), (width - 14, PANEL + MARGIN[1]));
                 let x = range(panel.points.iter().map(|p| p[0]));
-                let mut chart = axes(&part, Axes { ranges: [x, y.clone()], room: ROOM, ..Axes::default() })?;
+                let mut chart = axes(&part, Axes { ranges: [x, y.clone()], margin: MARGIN, ..Axes::default() })?;
                 let points = panel.points.iter().filter(|p| p.iter().all(|x| x.is_finite()));
                 chart.draw_series(LineSeries::new(points.clone().map(|p| (p[0], p[1])), color.stroke_width(2)))?;
                 let interval = |[x, mean, error]: &[f64; 3]| {
@@ -133,7 +133,7 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
                 };
                 chart.draw_series(points.map(interval))?;
                 let middle = left + width * column + (width - 14) / 2;
-                draw_lines(area, (middle, top + PANEL + ROOM[1]), &below(panel), false)?;
+                draw_lines(area, (middle, top + PANEL + MARGIN[1]), &below(panel), false)?;
                 if column == 0 {
                     draw_lines(area, (0, top + PANEL / 2), &beside(panel), true)?;
                 }
@@ -164,8 +164,8 @@ pub fn bar_pairs(title: &str, names: [&str; 2], pairs: &[BarPair<'_>]) -> String
         }
         // The first pair is at the top.
         let ranges = [low..high, pairs.len().max(1) as f64 - 0.5..-0.5];
-        let part = area.clone().shrink((0, top), (left + width, height + ROOM[1]));
-        let mut chart = axes(&part, Axes { ranges, room: [left, ROOM[1]], names: [None, Some(&labels)] })?;
+        let part = area.clone().shrink((0, top), (left + width, height + MARGIN[1]));
+        let mut chart = axes(&part, Axes { ranges, margin: [left, MARGIN[1]], names: [None, Some(&labels)] })?;
         for (row, pair) in pairs.iter().enumerate() {
             for ((k, [value, from, to]), ink) in pair.values.into_iter().enumerate().zip(inks) {
                 let y = row as f64 + 0.375 * (k as f64 - 0.5);
@@ -176,7 +176,7 @@ pub fn bar_pairs(title: &str, names: [&str; 2], pairs: &[BarPair<'_>]) -> String
         }
         Ok(())
     };
-    picture((left + width + 30, top + height + ROOM[1] + 6), draw).unwrap_or_default()
+    picture((left + width + 30, top + height + MARGIN[1] + 6), draw).unwrap_or_default()
 }
 
 impl ScatterPlot<'_> {
@@ -191,7 +191,7 @@ impl ScatterPlot<'_> {
         let [grey, color] = [palette::rigid(Ground::Paper), palette::series(1, Ground::Paper)].map(ink);
         picture((730, 420), |area| {
             let part = area.clone().shrink((22, 14), (690, 382));
-            let mut chart = axes(&part, Axes { ranges, room: ROOM, ..Axes::default() })?;
+            let mut chart = axes(&part, Axes { ranges, margin: MARGIN, ..Axes::default() })?;
             chart.draw_series(dots(self.points, 2, grey.mix(0.5).filled()))?;
             chart.draw_series(LineSeries::new(finite(self.front), color.stroke_width(2)))?;
             chart.draw_series(dots(self.front, 4, color.filled()))?;
@@ -266,13 +266,13 @@ pub fn histogram(label: &str, values: &[f64], bins: usize) -> String {
     let bars = bars(values, range.clone(), bins);
     let most = bars.iter().map(|[_, (_, count)]| *count).fold(1.0, f64::max);
     let draw = |area: &Area<'_>| {
-        let part = area.clone().shrink((0, 8), (400, 120 + ROOM[1]));
-        let mut chart = axes(&part, Axes { ranges: [range, 0.0..most], room: ROOM, ..Axes::default() })?;
+        let part = area.clone().shrink((0, 8), (400, 120 + MARGIN[1]));
+        let mut chart = axes(&part, Axes { ranges: [range, 0.0..most], margin: MARGIN, ..Axes::default() })?;
         let color = ink(palette::series(0, Ground::Paper));
         chart.draw_series(bars.into_iter().map(|bar| Rectangle::new(bar, color.filled())))?;
-        draw_lines(area, (226, 130 + ROOM[1]), &[label.to_owned()], false)
+        draw_lines(area, (226, 130 + MARGIN[1]), &[label.to_owned()], false)
     };
-    picture((420, 150 + ROOM[1]), draw).unwrap_or_default()
+    picture((420, 150 + MARGIN[1]), draw).unwrap_or_default()
 }
 
 /// Returns two opposite corners of each bar of a histogram.

@@ -112,7 +112,7 @@ impl FieldPlot<'_> {
             let part = area.clone().shrink((0, TOP), (left + width + 1, height + FOOT + 1));
             let ranges = [0, 1].map(|k| edge[k]..edge[k] + span[k]);
             let names = [0, 1].map(|k| self.names.map(|names| names[k]));
-            let mut chart = axes(&part, Axes { ranges, room: [left, FOOT], names })?;
+            let mut chart = axes(&part, Axes { ranges, margin: [left, FOOT], names })?;
             for j in 0..shown[1] {
                 let largest: Vec<f64> = (0..shown[0]).map(|i| self.largest([i, j], every)).collect();
                 let mut end = 0;

@@ -109,7 +109,7 @@ impl Threads {
                 self.hand_over();
             }
         }
-        self.untold().map_or(Ok(()), Err)
+        self.unreported().map_or(Ok(()), Err)
     }
 
     /// Sends the batch to all recorders and begins the next.
@@ -176,7 +176,7 @@ impl Threads {
     }
 
     /// Returns the first error not returned yet.
-    fn untold(&self) -> Option<LogError> {
+    fn unreported(&self) -> Option<LogError> {
         self.workers.iter().find_map(|worker| worker.failed.lock().unwrap_or_else(PoisonError::into_inner).take())
     }
 }

@@ -243,8 +243,8 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
             findings.extend(motion.violations.iter().map(|v| passed(v)));
             let closed = robot.rigid_model().map(|model| loops::along_motion(&model, &motion.trajectory).err());
             findings.extend(closed.ok().flatten().map(|e| Finding::error("loop", file(), &e)));
-            let room = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
-            findings.extend(room.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
+            let balancers = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
+            findings.extend(balancers.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
             let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));
             let caveats = motion.caveats().into_iter().chain(along.unwrap_or_default());
             findings.extend(caveats.map(|caveat| Finding::caveat(path, caveat)));

@@ -106,16 +106,16 @@ pub(super) fn of(
         let text = format!("the new commands exceed limits that the original motion satisfies: {}", worse.join("; "));
         caveats.push(Caveat::from_message("limits", "compensation", text, "slow the motion down a little"));
     }
-    let untold: Vec<&str> = robot
+    let unknown: Vec<&str> = robot
         .drives
         .iter()
         .filter(|d| d.play(false) != [0.0; 2] || d.friction != flexarm_stepping::Friction::NONE)
         .map(|d| d.joint.as_str())
         .collect();
-    if !untold.is_empty() {
+    if !unknown.is_empty() {
         let text = format!(
             "errors due to backlash and friction of {} are not corrected: they depend on the direction of approach",
-            untold.join(", ")
+            unknown.join(", ")
         );
         caveats.push(
             Caveat::from_message("play", "compensation", text, "approach every point from the same side").as_note(),

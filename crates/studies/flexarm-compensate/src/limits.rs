@@ -13,7 +13,7 @@ use flexarm_run::{Arm, Caveat, Error, Motion, MotionViolation, Robot, Scenario};
 /// it counts as the motion's own.
 const SAME: f64 = 1e-3;
 /// Margin of a slowed motion below a limit.
-const ROOM: f64 = 1.01;
+const MARGIN: f64 = 1.01;
 /// Maximum number of attempts at slowing a motion.
 const MAX_TIMES: usize = 6;
 /// Maximum factor by which a motion is slowed.
@@ -101,7 +101,7 @@ pub(super) fn kept(
 /// Returns the factor by which to lengthen a motion to keep a limit; infinite if that does not
 /// help.
 fn slower(limit: &MotionViolation) -> f64 {
-    let over = ROOM * (limit.value / limit.limit).abs();
+    let over = MARGIN * (limit.value / limit.limit).abs();
     match limit.kind {
         "velocity" => over,
         // The gravity part of a torque does not scale: repeat until the torque is low enough.

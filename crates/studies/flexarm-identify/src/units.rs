@@ -52,16 +52,16 @@ pub(super) fn check_units(nominal: &NominalArm, input: &MeasurementInput) -> Res
     let norm = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>().sqrt();
     let moved = of(|reading| matches!(reading.kind, ReadingKind::Displacement { .. }));
     let (measured, expected) = both(&moved);
-    told_ratio("displacements", norm(&measured), norm(&expected), input)?;
+    check_ratio("displacements", norm(&measured), norm(&expected), input)?;
     let (measured, expected) = both(&of(|reading| reading.position().is_some()));
     let spread = |values: &[f64]| {
         let points: Vec<Vector3<f64>> = values.chunks_exact(3).map(Vector3::from_column_slice).collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>().sqrt()
     };
-    told_ratio("distances between places", spread(&measured), spread(&expected), input)?;
+    check_ratio("distances between places", spread(&measured), spread(&expected), input)?;
     let (measured, expected) = both(&of(|reading| matches!(reading.kind, ReadingKind::Frequencies { .. })));
-    told_frequencies(&measured, &expected)?;
+    check_frequencies(&measured, &expected)?;
     for reading in &input.measurements.readings {
         let ReadingKind::Response(response) = &reading.kind else { continue };
         let plain = MeasuredResponse { form: Form::Logarithmic, ..response.clone() };
@@ -81,7 +81,7 @@ pub(super) fn check_units(nominal: &NominalArm, input: &MeasurementInput) -> Res
 }
 
 /// Refuses frequencies that are those of the model in rad/s.
-fn told_frequencies(measured: &[f64], expected: &[f64]) -> Result<(), Error> {
+fn check_frequencies(measured: &[f64], expected: &[f64]) -> Result<(), Error> {
     let ratios: Vec<f64> = measured.iter().zip(expected).map(|(a, b)| a / b).collect();
     let turn = std::f64::consts::TAU;
     let in_rad = |ratio: &f64| (turn / RADIAN_RATIO..turn * RADIAN_RATIO).contains(ratio);
@@ -94,7 +94,7 @@ fn told_frequencies(measured: &[f64], expected: &[f64]) -> Result<(), Error> {
     }
 }
 
-fn told_ratio(what: &'static str, measured: f64, expected: f64, input: &MeasurementInput) -> Result<(), Error> {
+fn check_ratio(what: &'static str, measured: f64, expected: f64, input: &MeasurementInput) -> Result<(), Error> {
     if measured == 0.0 || expected == 0.0 {
         return Ok(());
     }

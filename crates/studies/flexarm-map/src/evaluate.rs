@@ -12,7 +12,7 @@ use flexarm_run::{Error, Modelling, Robot, posed};
 
 /// Indices of a pose in the map.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Seat {
+pub(super) struct PoseLabel {
     pub(super) place: usize,
     pub(super) direction: usize,
     pub(super) branch: usize,
@@ -71,12 +71,12 @@ impl<'a> Evaluator<'a> {
     /// `failed`, also in order.
     ///
     /// * `poses`: actuated joints in coordinate order (rad or m), pose after pose.
-    /// * `seats`: one per pose.
+    /// * `labels`: one per pose.
     /// * `go_on`: returns `false` if the rest is not wanted; cutting limits then fail.
     pub(super) fn push(
         &mut self,
         poses: &[f64],
-        seats: &[Seat],
+        labels: &[PoseLabel],
         rows: &mut Vec<f64>,
         go_on: &dyn Fn() -> bool,
         mut failed: impl FnMut(Error),
@@ -86,7 +86,7 @@ impl<'a> Evaluator<'a> {
         let mut push = |k: usize, weighed: &GravityResult, found: &PoseAnswer| -> Result<(), Error> {
             let q = &poses[k * joints..][..joints];
             let depth = cut.map(|cut| cut.lowest_limit(q, go_on)).transpose()?;
-            push_row(layout, q, seats[k], weighed, found, depth, rows);
+            push_row(layout, q, labels[k], weighed, found, depth, rows);
             Ok(())
         };
         // Frequencies are computed under gravity only, compliance and contributions under the load.
@@ -97,7 +97,7 @@ impl<'a> Evaluator<'a> {
                 Err(error) => failed(posed::step_error(error)),
             });
         }
-        let mut weighed = Vec::with_capacity(seats.len());
+        let mut weighed = Vec::with_capacity(labels.len());
         at.solve_each(poses, &Wrench::zeros(), under_weight, |_, answer| {
             weighed.push(answer.map(|found| GravityResult::new(found, layout)));
         });
@@ -114,14 +114,14 @@ impl<'a> Evaluator<'a> {
 fn push_row(
     layout: &Layout,
     q: &[f64],
-    seat: Seat,
+    label: PoseLabel,
     weighed: &GravityResult,
     found: &PoseAnswer,
     depth: Option<f64>,
     rows: &mut Vec<f64>,
 ) {
     rows.extend(found.rigid_tcp_pose.translation.vector.iter());
-    rows.extend([seat.place as f64, seat.direction as f64, seat.branch as f64]);
+    rows.extend([label.place as f64, label.direction as f64, label.branch as f64]);
     debug_assert_eq!(HEAD.len(), 6);
     rows.extend(q);
     let sag = &weighed.sag;

@@ -10,7 +10,7 @@ use nalgebra::Rotation3;
 use rayon::prelude::*;
 
 use super::columns::{Layout, PLACE, cheapest};
-use super::evaluate::{Evaluator, Seat};
+use super::evaluate::{Evaluator, PoseLabel};
 use super::finder::Finder;
 use super::region::{Grid, pose_at};
 use super::{KeptPoses, MAX_PLACES, MapError};
@@ -148,7 +148,7 @@ struct Worker<'a> {
     /// Joint positions of the poses waiting for evaluation, always of whole places, and their
     /// indices.
     waiting: Vec<f64>,
-    seats: Vec<Seat>,
+    labels: Vec<PoseLabel>,
     /// Rows of the waiting poses; buffer reused.
     rows: Vec<f64>,
 }
@@ -160,7 +160,7 @@ impl<'a> Worker<'a> {
             Places::Joints { .. } => None,
         };
         let (evaluator, branches, waiting) = (evaluator.clone(), Vec::new(), Vec::new());
-        Self { places, finder, evaluator, choice, branches, waiting, seats: Vec::new(), rows: Vec::new() }
+        Self { places, finder, evaluator, choice, branches, waiting, labels: Vec::new(), rows: Vec::new() }
     }
 
     fn chunk(&mut self, from: usize, to: usize, go_on: &dyn Fn() -> bool) -> Evaluation {
@@ -179,10 +179,10 @@ impl<'a> Worker<'a> {
                     self.branches.clear();
                     values(place, &mut self.branches);
                     self.waiting.extend(&self.branches);
-                    self.seats.push(Seat { place, direction: 0, branch: 0 });
+                    self.labels.push(PoseLabel { place, direction: 0, branch: 0 });
                 }
             }
-            if self.seats.len() >= MAX_WAITING {
+            if self.labels.len() >= MAX_WAITING {
                 self.answer(&mut taken, go_on);
             }
         }
@@ -196,14 +196,14 @@ impl<'a> Worker<'a> {
         finder.find(X_WT, &mut self.branches);
         let found = self.branches.len() / self.choice.layout.joints;
         self.waiting.extend(&self.branches);
-        self.seats.extend((0..found).map(|branch| Seat { place, direction, branch }));
+        self.labels.extend((0..found).map(|branch| PoseLabel { place, direction, branch }));
     }
 
     /// Evaluates all waiting poses, and keeps the selected rows of each place.
     fn answer(&mut self, taken: &mut Evaluation, go_on: &dyn Fn() -> bool) {
-        taken.poses += self.seats.len();
+        taken.poses += self.labels.len();
         let mut rows = std::mem::take(&mut self.rows);
-        self.evaluator.push(&self.waiting, &self.seats, &mut rows, go_on, |error| {
+        self.evaluator.push(&self.waiting, &self.labels, &mut rows, go_on, |error| {
             taken.failed += 1;
             taken.first_failure.get_or_insert_with(|| error.to_string());
         });
@@ -218,7 +218,7 @@ impl<'a> Worker<'a> {
         rows.clear();
         self.rows = rows;
         self.waiting.clear();
-        self.seats.clear();
+        self.labels.clear();
     }
 
     /// Appends the selected rows of one place; the first row if none has a finite cost.

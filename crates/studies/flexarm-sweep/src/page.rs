@@ -86,7 +86,7 @@ impl Sweep {
         };
         let mut out = String::new();
         for (metric, ranking) in self.metrics.iter().zip(rankings) {
-            let all = ranking.matter.len() + ranking.untold.len();
+            let all = ranking.matter.len() + ranking.indistinct.len();
             if all == 0 {
                 continue;
             }
@@ -95,8 +95,8 @@ impl Sweep {
                 true => write!(out, "<p>{name}: no parameter has a significant effect."),
                 false => write!(out, "<p>{name}: {}.", names(&mut ranking.matter.iter().map(|(p, _)| *p))),
             };
-            if let Some(chance) = ranking.chance.filter(|_| !ranking.untold.is_empty()) {
-                let untold = names(&mut ranking.untold.iter().copied());
+            if let Some(chance) = ranking.chance.filter(|_| !ranking.indistinct.is_empty()) {
+                let indistinct = names(&mut ranking.indistinct.iter().copied());
                 let reach = match chance < 1.0 {
                     true => format!(
                         "chance may explain {:.0} % of the variance with this number of samples",
@@ -106,7 +106,7 @@ impl Sweep {
                 };
                 let _ = write!(
                     out,
-                    " Not distinguishable from chance: {untold} ({reach}; more samples resolve smaller effects)."
+                    " Not distinguishable from chance: {indistinct} ({reach}; more samples resolve smaller effects)."
                 );
             }
             out += "</p>\n";
@@ -242,7 +242,7 @@ impl Sweep {
         let every = columns.runs.len().div_ceil(MAX_IN_MATRIX).max(1);
         let thinned = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
         let metrics = self.metrics.len().min(MAX_METRICS);
-        let ranked = ranking.map(|r| r.matter.iter().map(|(p, _)| *p).chain(r.untold.iter().copied()));
+        let ranked = ranking.map(|r| r.matter.iter().map(|(p, _)| *p).chain(r.indistinct.iter().copied()));
         let mut named: Vec<(String, Vec<f64>)> = Vec::new();
         for p in ranked.into_iter().flatten().take(MAX_COLUMNS - metrics) {
             if let Some(x) = self.shown_values(p, columns) {

@@ -20,7 +20,7 @@ pub(super) struct Ranking {
     /// Significant parameters with their share of the variance, strongest first.
     pub(super) matter: Vec<(usize, f64)>,
     /// Random parameters whose effect cannot be distinguished from chance.
-    pub(super) untold: Vec<usize>,
+    pub(super) indistinct: Vec<usize>,
     /// Share of the variance due to random sampling that the strongest random parameter would
     /// explain by chance in 1 of 100 studies.
     pub(super) chance: Option<f64>,
@@ -68,7 +68,7 @@ impl Sweep {
             }
             let Some(share) = self.effect(k, metric, columns).map(|effect| effect.share) else { continue };
             match sources.iter().any(|source| source.columns.contains(&k)) {
-                true if !named.contains(&k) => ranking.untold.push(k),
+                true if !named.contains(&k) => ranking.indistinct.push(k),
                 _ if share > ROUNDING => ranking.matter.push((k, share)),
                 _ => {}
             }

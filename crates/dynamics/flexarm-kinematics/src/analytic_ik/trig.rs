@@ -69,9 +69,9 @@ pub(crate) fn linear(a: f64, b: f64, c: f64, floor: f64, hint: f64) -> Roots {
     if size <= floor {
         return Roots { angles: [hint; 2], n: 1, free: true };
     }
-    let room = (size - c) * (size + c);
-    let half = if room > 0.0 {
-        room.sqrt().atan2(c)
+    let product = (size - c) * (size + c);
+    let half = if product > 0.0 {
+        product.sqrt().atan2(c)
     } else if c > 0.0 {
         0.0
     } else {

@@ -149,20 +149,20 @@ pub(crate) fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
 #[inline(never)]
 pub(crate) fn solve(model: &Model, data: &mut Data, state: &State, free: &[usize]) {
     let Some(loops) = &mut data.loops else { return };
-    let mut room = std::mem::take(&mut loops.free);
-    room.fit(free.len());
-    room.right.iter_mut().zip(free).for_each(|(right, &k)| *right = data.tau[k]);
+    let mut workspace = std::mem::take(&mut loops.free);
+    workspace.fit(free.len());
+    workspace.right.iter_mut().zip(free).for_each(|(right, &k)| *right = data.tau[k]);
     free.iter().for_each(|&k| data.qddot[k] = 0.0);
     // Bias, including the accelerations of the prescribed coordinates.
     let mut qddot = std::mem::replace(&mut data.qddot, DVector::zeros(0));
     rnea::inverse_dynamics(model, data, state, &qddot);
-    room.right.iter_mut().zip(free).for_each(|(right, &k)| *right -= data.tau[k]);
+    workspace.right.iter_mut().zip(free).for_each(|(right, &k)| *right -= data.tau[k]);
     mass_matrix_at_poses(model, data);
-    room.solve(|i, j| data.M[(free[i], free[j])]);
-    room.right.iter().zip(free).for_each(|(a, &k)| qddot[k] = *a);
+    workspace.solve(|i, j| data.M[(free[i], free[j])]);
+    workspace.right.iter().zip(free).for_each(|(a, &k)| qddot[k] = *a);
     rnea::inverse_dynamics(model, data, state, &qddot);
     data.qddot = qddot;
     if let Some(loops) = &mut data.loops {
-        loops.free = room;
+        loops.free = workspace;
     }
 }

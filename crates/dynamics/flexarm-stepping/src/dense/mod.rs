@@ -167,21 +167,21 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
 
 /// Computes `Eᵀ C E` with `E = 1 + c X` for a symmetric C; both workspaces are n × n.
 #[inline(always)]
-pub fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, room: [&mut [f64]; 2], product: &mut [f64]) {
-    let [room, Xt] = room;
+pub fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, workspaces: [&mut [f64]; 2], product: &mut [f64]) {
+    let [CE, Xt] = workspaces;
     if n == 0 {
         return;
     }
     // P = C Sᵀ
-    room.copy_from_slice(C);
-    for (column, x) in room.chunks_exact_mut(n).zip(X.chunks_exact(n)) {
+    CE.copy_from_slice(C);
+    for (column, x) in CE.chunks_exact_mut(n).zip(X.chunks_exact(n)) {
         add_columns(C, x.iter().map(|x| c * x), column);
     }
     // P + c Xᵀ P
     Xt.copy_from_slice(X);
     transpose(Xt, n);
-    product.copy_from_slice(room);
-    for (column, p) in product.chunks_exact_mut(n).zip(room.chunks_exact(n)) {
+    product.copy_from_slice(CE);
+    for (column, p) in product.chunks_exact_mut(n).zip(CE.chunks_exact(n)) {
         add_columns(Xt, p.iter().map(|p| c * p), column);
     }
 }

@@ -82,7 +82,7 @@ impl ReducedArm {
         }
         if let Some((before, after)) = self.events.pass_jumps(t) {
             (self.sampled_at, self.step_start.time) = (f64::NAN, f64::NAN);
-            self.strike(t, before, after, x, v)?;
+            self.apply_impulses(t, before, after, x, v)?;
             what = what.max(Change::Motion);
         }
         if let Some(servo) = &mut self.servo
@@ -169,7 +169,7 @@ impl ReducedArm {
 
     /// Applies the impulse of prescribed velocities that jump between `before` and `after`; see the
     /// module documentation.
-    fn strike(
+    fn apply_impulses(
         &mut self,
         t: f64,
         before: f64,
@@ -214,7 +214,7 @@ impl ReducedArm {
             free.map_or(self.state.qdot[k], |i| v[i] + self.shifted[i])
         };
         let row = |k: usize| (0..M.ncols()).map(|l| M[(k, l)] * self.tau[l]).sum::<f64>();
-        self.struck += (0..M.nrows()).map(|k| (new(k) - 0.5 * self.tau[k]) * row(k)).sum::<f64>();
+        self.impulse_work += (0..M.nrows()).map(|k| (new(k) - 0.5 * self.tau[k]) * row(k)).sum::<f64>();
         *v += &self.shifted;
         Ok(())
     }

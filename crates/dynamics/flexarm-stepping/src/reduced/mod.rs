@@ -44,7 +44,7 @@ pub struct ReducedArm {
     /// Damping after each change of inertia.
     pub(crate) dampings: Vec<ArmDamping>,
     /// Work done by the drives at jumps of prescribed velocities (J).
-    pub(crate) struck: f64,
+    pub(crate) impulse_work: f64,
     geometric: bool,
     pub(crate) sampled_at: f64,
     pub(crate) step_start: StepStart,
@@ -81,7 +81,7 @@ impl ReducedArm {
             servo: plant.servo.clone().map(|servo| ServoState::new(servo, &plant)),
             events: EventQueue::of(&plant),
             dampings: damping_after_changes(&plant),
-            struck: 0.0,
+            impulse_work: 0.0,
             geometric,
             sampled_at: f64::NAN,
             step_start: StepStart::new(model.n_actuated()),

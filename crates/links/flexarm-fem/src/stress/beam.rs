@@ -12,7 +12,7 @@
 
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3, Vector6};
 
-use super::fields::{INERTIA_LOADS, SectionForces, StressFields, StressSeat};
+use super::fields::{INERTIA_LOADS, SectionForces, StressFields, StressSite};
 use super::map::part_load;
 use crate::beam_link::BeamLink;
 use crate::error::{FemError, positive};
@@ -57,7 +57,7 @@ impl BeamLink {
         let columns = 6 + INERTIA_LOADS;
         let count = outline.len();
         let mut stress = DMatrix::zeros(6 * count * (PIECES + 1), columns);
-        let mut seats = Vec::with_capacity(count * (PIECES + 1));
+        let mut sites = Vec::with_capacity(count * (PIECES + 1));
         let x: Vec<f64> = (0..=PIECES).map(|plane| self.length * plane as f64 / PIECES as f64).collect();
         let mut forces = DMatrix::zeros(6 * x.len(), columns);
         for (plane, &x) in x.iter().enumerate() {
@@ -66,10 +66,10 @@ impl BeamLink {
                 forces.fixed_view_mut::<6, 1>(6 * plane, j).copy_from(&F.cast::<f32>());
             }
             for point in &outline {
-                let first = 6 * seats.len();
+                let first = 6 * sites.len();
                 let position = self.X_LE * Point3::new(x, point.y, point.z);
-                seats.push(StressSeat {
-                    node: seats.len() as u64 + 1,
+                sites.push(StressSite {
+                    node: sites.len() as u64 + 1,
                     position: position.coords,
                     material: 0,
                     from_tie: f64::INFINITY,
@@ -90,8 +90,8 @@ impl BeamLink {
             compliance: DMatrix::from_column_slice(6, 6, compliance.as_slice()),
             frequencies_hz: Vec::new(),
             materials: vec![self.material],
-            triangles: surface(&seats, count),
-            seats,
+            triangles: surface(&sites, count),
+            sites,
             stress,
             section_forces: Some(SectionForces { x, forces }),
         })
@@ -158,12 +158,12 @@ fn stress_at(point: &OutlinePoint, [A, I_y, I_z]: [f64; 3], F: &Vector6<f64>) ->
 }
 
 /// Triangles between the outlines at neighbouring planes; none between two points at one place.
-fn surface(seats: &[StressSeat], count: usize) -> Vec<[u32; 3]> {
+fn surface(sites: &[StressSite], count: usize) -> Vec<[u32; 3]> {
     let quads = (0..PIECES).flat_map(|plane| (0..count).map(move |k| (plane * count, k)));
     let triangles = quads.filter_map(|(first, k)| {
         let [a, b] = [first + k, first + (k + 1) % count];
-        let is_wide = (seats[a].position - seats[b].position).norm() > 0.0;
-        let [a, b, c, d] = [a, b, b + count, a + count].map(|seat| seat as u32);
+        let is_wide = (sites[a].position - sites[b].position).norm() > 0.0;
+        let [a, b, c, d] = [a, b, b + count, a + count].map(|site| site as u32);
         is_wide.then_some([[a, b, c], [a, c, d]])
     });
     triangles.flatten().collect()

@@ -64,16 +64,16 @@ pub enum StressFileError {
     StressShape {
         /// Shape found.
         found: Vec<usize>,
-        /// Fields, seats, components.
+        /// Fields, sites, components.
         expected: [usize; 3],
     },
-    /// Tensors about the seats have other lengths than their positions.
-    #[error("its tensors \"node\", \"material\", \"from_tie\" do not have {seats} entries; {REDUCE_AGAIN}")]
+    /// Tensors about the sites have other lengths than their positions.
+    #[error("its tensors \"node\", \"material\", \"from_tie\" do not have {sites} entries; {REDUCE_AGAIN}")]
     SeatCounts {
         /// Number of positions.
-        seats: usize,
+        sites: usize,
     },
-    /// A material or a seat is not there.
+    /// A material or a site is not there.
     #[error("an index is out of range; {REDUCE_AGAIN}")]
     IndexOutOfRange,
     /// The compliance does not have one row and column per unit wrench.

@@ -14,7 +14,7 @@ pub const INERTIA_LOADS: usize = 12;
 
 /// Node of the surface with its material.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct StressSeat {
+pub struct StressSite {
     /// Number of the node in the mesh file.
     pub node: u64,
     /// Position, link axes, m.
@@ -57,14 +57,14 @@ pub struct StressFields {
     pub compliance: DMatrix<f64>,
     /// Natural frequencies of the fixed-interface modes, Hz.
     pub frequencies_hz: Vec<f64>,
-    /// Materials of the seats.
+    /// Materials of the sites.
     pub materials: Vec<Material>,
     /// Nodes of the surface; a node with several materials occurs once for each.
-    pub seats: Vec<StressSeat>,
-    /// Triangles of the surface, as indices into the seats.
+    pub sites: Vec<StressSite>,
+    /// Triangles of the surface, as indices into the sites.
     pub triangles: Vec<[u32; 3]>,
     /// Stress, Pa per unit (N, N m, m/s², rad/s², rad²/s², modal amplitude): six components
-    /// `xx yy zz xy yz zx` of the first seat, then of the second, ...; one column per wrench
+    /// `xx yy zz xy yz zx` of the first site, then of the second, ...; one column per wrench
     /// component, inertia load and mode.
     pub stress: DMatrix<f32>,
     /// Section forces; `None` for a mesh.
@@ -85,11 +85,11 @@ impl ModalSource<'_> {
         let columns = U.ncols();
         let stress = |row: usize, j: usize| stress[row / 6 * columns + j][row % 6] as f32;
         // A triangle has the seats of the first material at its nodes.
-        let mut seat_of = vec![u32::MAX; self.mesh.nodes.len()];
+        let mut site_of = vec![u32::MAX; self.mesh.nodes.len()];
         for (k, place) in places.iter().enumerate().rev() {
-            seat_of[place.node as usize] = k as u32;
+            site_of[place.node as usize] = k as u32;
         }
-        let triangles = surface.triangles().into_iter().map(|corners| corners.map(|node| seat_of[node as usize]));
+        let triangles = surface.triangles().into_iter().map(|corners| corners.map(|node| site_of[node as usize]));
         StressFields {
             link: link.into(),
             interfaces: self.interfaces.iter().map(|interface| interface.name.clone()).collect(),
@@ -102,22 +102,22 @@ impl ModalSource<'_> {
                 .map(|omega2| omega2.sqrt() / std::f64::consts::TAU)
                 .collect(),
             materials: recovery.distinct_materials(),
-            seats: self.seats(&places),
+            sites: self.sites(&places),
             triangles: triangles.collect(),
             stress: DMatrix::from_fn(6 * places.len(), columns, stress),
             section_forces: None,
         }
     }
 
-    fn seats(&self, places: &[NodalPlace]) -> Vec<StressSeat> {
+    fn sites(&self, places: &[NodalPlace]) -> Vec<StressSite> {
         let tied = self.interfaces.iter().flat_map(|interface| &interface.nodes);
         let tied: Vec<_> = tied.map(|node| self.mesh.nodes[*node as usize]).collect();
-        let seat = |place: &NodalPlace| {
+        let site = |place: &NodalPlace| {
             let position = self.mesh.nodes[place.node as usize];
             let squared = tied.iter().map(|tied| (position - tied).norm_squared()).fold(f64::INFINITY, f64::min);
             let node = self.mesh.node_ids[place.node as usize];
-            StressSeat { node, position, material: place.material as usize, from_tie: squared.sqrt() }
+            StressSite { node, position, material: place.material as usize, from_tie: squared.sqrt() }
         };
-        places.iter().map(seat).collect()
+        places.iter().map(site).collect()
     }
 }

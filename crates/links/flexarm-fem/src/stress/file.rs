@@ -2,10 +2,10 @@
 //!
 //! | tensor | shape | what |
 //! | --- | --- | --- |
-//! | `stress` | fields, seats, 6 | Pa per unit, `xx yy zz xy yz zx`: wrenches, inertia loads, modes |
-//! | `position` | seats, 3 | m, link axes |
-//! | `node`, `material`, `from_tie` | seats | number in the mesh, index, m |
-//! | `triangle` | triangles, 3 | seats of the surface |
+//! | `stress` | fields, sites, 6 | Pa per unit, `xx yy zz xy yz zx`: wrenches, inertia loads, modes |
+//! | `position` | sites, 3 | m, link axes |
+//! | `node`, `material`, `from_tie` | sites | number in the mesh, index, m |
+//! | `triangle` | triangles, 3 | sites of the surface |
 //! | `materials` | materials, 3 | E (Pa), nu, rho (kg/m³) |
 //! | `pose` | interfaces, 12 | rotation by rows, position (m) |
 //! | `compliance` | 6 per interface but the first | its displacement under unit wrenches |
@@ -20,7 +20,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
 use super::error::StressFileError;
-use super::fields::{INERTIA_LOADS, StressFields, StressSeat};
+use super::fields::{INERTIA_LOADS, StressFields, StressSite};
 use crate::material::Material;
 
 /// Format with its version.
@@ -39,36 +39,36 @@ struct About {
 
 /// Returns the content of a stress file.
 pub fn write_stress(fields: &StressFields) -> Vec<u8> {
-    let seats = fields.seats.len();
+    let sites = fields.sites.len();
     let bytes = |numbers: &mut dyn Iterator<Item = f64>| numbers.flat_map(f64::to_le_bytes).collect::<Vec<u8>>();
     let pose = |X: &Pose| {
         let R = X.rotation.matrix().transpose();
         R.iter().chain(X.translation.vector.iter()).copied().collect::<Vec<_>>()
     };
     let materials = fields.materials.iter().flat_map(|material| [material.E, material.nu, material.rho]);
-    let tied = fields.seats.iter().map(|seat| seat.from_tie);
+    let tied = fields.sites.iter().map(|site| site.from_tie);
     let n = fields.compliance.nrows();
     let parts: [(&str, Dtype, Vec<usize>, Vec<u8>); 10] = [
         (
             "stress",
             Dtype::F32,
-            vec![fields.stress.ncols(), seats, 6],
+            vec![fields.stress.ncols(), sites, 6],
             fields.stress.iter().flat_map(|stress| stress.to_le_bytes()).collect(),
         ),
-        ("position", Dtype::F64, vec![seats, 3], bytes(&mut fields.seats.iter().flat_map(|s| s.position.data.0[0]))),
-        ("node", Dtype::U64, vec![seats], fields.seats.iter().flat_map(|seat| seat.node.to_le_bytes()).collect()),
+        ("position", Dtype::F64, vec![sites, 3], bytes(&mut fields.sites.iter().flat_map(|s| s.position.data.0[0]))),
+        ("node", Dtype::U64, vec![sites], fields.sites.iter().flat_map(|site| site.node.to_le_bytes()).collect()),
         (
             "material",
             Dtype::U32,
-            vec![seats],
-            fields.seats.iter().flat_map(|seat| (seat.material as u32).to_le_bytes()).collect(),
+            vec![sites],
+            fields.sites.iter().flat_map(|site| (site.material as u32).to_le_bytes()).collect(),
         ),
-        ("from_tie", Dtype::F64, vec![seats], bytes(&mut tied.into_iter())),
+        ("from_tie", Dtype::F64, vec![sites], bytes(&mut tied.into_iter())),
         (
             "triangle",
             Dtype::U32,
             vec![fields.triangles.len(), 3],
-            fields.triangles.iter().flatten().flat_map(|seat| seat.to_le_bytes()).collect(),
+            fields.triangles.iter().flatten().flat_map(|site| site.to_le_bytes()).collect(),
         ),
         ("materials", Dtype::F64, vec![fields.materials.len(), 3], bytes(&mut materials.into_iter())),
         ("pose", Dtype::F64, vec![fields.poses.len(), 12], bytes(&mut fields.poses.iter().flat_map(pose))),
@@ -99,10 +99,10 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
     let file = Tensors { file: &file };
     let (materials, poses) = (file.rows("materials", 3)?, file.rows("pose", 12)?);
     let frequencies_hz = file.numbers("frequency_hz")?;
-    let seats = file.seats(materials.len())?;
-    let triangles = file.triangles(seats.len())?;
+    let sites = file.sites(materials.len())?;
+    let triangles = file.triangles(sites.len())?;
     let wrenches = 6 * poses.len().saturating_sub(1);
-    let stress = file.stress(wrenches + INERTIA_LOADS + frequencies_hz.len(), seats.len())?;
+    let stress = file.stress(wrenches + INERTIA_LOADS + frequencies_hz.len(), sites.len())?;
     let compliance = file.compliance(wrenches)?;
     if about.interfaces.len() != poses.len() {
         return Err(StressFileError::PoseCount { interfaces: about.interfaces.len(), poses: poses.len() });
@@ -118,7 +118,7 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
         compliance,
         frequencies_hz,
         materials: materials.iter().map(|row| Material::isotropic(row[0], row[1], row[2])).collect(),
-        seats,
+        sites,
         triangles,
         stress,
         section_forces: None,
@@ -179,38 +179,38 @@ impl<'a> Tensors<'a> {
         Ok(tensor.data().as_chunks().0.iter().map(|word| u64::from(u32::from_le_bytes(*word))).collect())
     }
 
-    fn seats(&self, materials: usize) -> Result<Vec<StressSeat>, StressFileError> {
+    fn sites(&self, materials: usize) -> Result<Vec<StressSite>, StressFileError> {
         let positions = self.rows("position", 3)?;
         let (nodes, kinds, tied) = (self.whole("node")?, self.whole("material")?, self.numbers("from_tie")?);
-        let seats = positions.len();
-        if [nodes.len(), kinds.len(), tied.len()] != [seats; 3] {
-            return Err(StressFileError::SeatCounts { seats });
+        let sites = positions.len();
+        if [nodes.len(), kinds.len(), tied.len()] != [sites; 3] {
+            return Err(StressFileError::SeatCounts { sites });
         }
         if kinds.iter().any(|kind| *kind >= materials as u64) {
             return Err(StressFileError::IndexOutOfRange);
         }
         positions.iter().try_for_each(|position| check_finite(position))?;
-        let seat = |k: usize| StressSeat {
+        let site = |k: usize| StressSite {
             node: nodes[k],
             position: Vector3::from_column_slice(&positions[k]),
             material: kinds[k] as usize,
             from_tie: tied[k],
         };
-        Ok((0..seats).map(seat).collect())
+        Ok((0..sites).map(site).collect())
     }
 
-    fn triangles(&self, seats: usize) -> Result<Vec<[u32; 3]>, StressFileError> {
+    fn triangles(&self, sites: usize) -> Result<Vec<[u32; 3]>, StressFileError> {
         let corners = self.whole("triangle")?;
-        if corners.iter().any(|seat| *seat >= seats as u64) {
+        if corners.iter().any(|site| *site >= sites as u64) {
             return Err(StressFileError::IndexOutOfRange);
         }
-        Ok(corners.as_chunks().0.iter().map(|corners| corners.map(|seat| seat as u32)).collect())
+        Ok(corners.as_chunks().0.iter().map(|corners| corners.map(|site| site as u32)).collect())
     }
 
-    /// Stress by fields, six rows per seat.
-    fn stress(&self, fields: usize, seats: usize) -> Result<DMatrix<f32>, StressFileError> {
+    /// Stress by fields, six rows per site.
+    fn stress(&self, fields: usize, sites: usize) -> Result<DMatrix<f32>, StressFileError> {
         let tensor = self.tensor("stress", Dtype::F32)?;
-        let expected = [fields, seats, 6];
+        let expected = [fields, sites, 6];
         if tensor.shape() != expected {
             return Err(StressFileError::StressShape { found: tensor.shape().to_vec(), expected });
         }
@@ -218,7 +218,7 @@ impl<'a> Tensors<'a> {
         if !stress.iter().all(|stress| stress.abs() < LARGEST) {
             return Err(StressFileError::ImpossibleNumber { largest: LARGEST });
         }
-        Ok(DMatrix::from_vec(6 * seats, fields, stress))
+        Ok(DMatrix::from_vec(6 * sites, fields, stress))
     }
 
     /// Displacements under unit wrenches.

@@ -14,32 +14,32 @@ use super::fields::StressFields;
 const TANGENTIAL: f64 = 0.1;
 
 impl StressFields {
-    /// Returns the seat nearest to a point (link axes, m); of a node with several materials the
+    /// Returns the site nearest to a point (link axes, m); of a node with several materials the
     /// first one.
     ///
     /// # Errors
     /// [`StressError::OffSurface`] if the point is farther from it than the longest edge at this
     /// node; [`StressError::NoSurface`].
-    pub fn nearest_seat(&self, point: &Vector3<f64>) -> Result<usize, StressError> {
-        let place = |k: u32| self.seats[k as usize].position;
+    pub fn nearest_site(&self, point: &Vector3<f64>) -> Result<usize, StressError> {
+        let place = |k: u32| self.sites[k as usize].position;
         let from = |k: &u32| (place(*k) - point).norm();
         let nearest = self.triangles.iter().flatten().copied().min_by(|a, b| from(a).total_cmp(&from(b)));
-        let seat = nearest.ok_or(StressError::NoSurface)?;
-        let own = self.triangles.iter().filter(|corners| corners.contains(&seat)).flatten();
-        let edge = own.map(|k| (place(*k) - place(seat)).norm()).fold(0.0, f64::max);
-        let off = from(&seat);
+        let site = nearest.ok_or(StressError::NoSurface)?;
+        let own = self.triangles.iter().filter(|corners| corners.contains(&site)).flatten();
+        let edge = own.map(|k| (place(*k) - place(site)).norm()).fold(0.0, f64::max);
+        let off = from(&site);
         if off > edge {
-            return Err(StressError::OffSurface { nearest_mm: (place(seat) * 1e3).into(), off_mm: 1e3 * off });
+            return Err(StressError::OffSurface { nearest_mm: (place(site) * 1e3).into(), off_mm: 1e3 * off });
         }
-        Ok(seat as usize)
+        Ok(site as usize)
     }
 
-    /// Returns the outward normal of the surface at a seat: mean of its triangles with the weights of
+    /// Returns the outward normal of the surface at a site: mean of its triangles with the weights of
     /// Max (1999), *J. Graphics Tools* 4(2), which are exact on a sphere.
-    pub fn normal(&self, seat: usize) -> Vector3<f64> {
-        let edge = |k: u32| self.seats[k as usize].position - self.seats[seat].position;
+    pub fn normal(&self, site: usize) -> Vector3<f64> {
+        let edge = |k: u32| self.sites[k as usize].position - self.sites[site].position;
         let weighted = self.triangles.iter().filter_map(|corners| {
-            let k = corners.iter().position(|corner| *corner as usize == seat)?;
+            let k = corners.iter().position(|corner| *corner as usize == site)?;
             let [e, f] = [1, 2].map(|next| edge(corners[(k + next) % 3]));
             Some(e.cross(&f) / (e.norm_squared() * f.norm_squared()))
         });
@@ -54,8 +54,8 @@ impl StressFields {
     ///
     /// # Errors
     /// [`StressError::NormalDirection`].
-    pub fn strain_by_stress(&self, seat: usize, direction: &Vector3<f64>, angle: f64) -> Result<[f64; 6], StressError> {
-        let n = self.normal(seat);
+    pub fn strain_by_stress(&self, site: usize, direction: &Vector3<f64>, angle: f64) -> Result<[f64; 6], StressError> {
+        let n = self.normal(site);
         let along = direction - n * n.dot(direction);
         // Not above, rather than below: a direction of zero length gives no number.
         if !(along.norm() > TANGENTIAL * direction.norm()) {
@@ -63,7 +63,7 @@ impl StressFields {
             return Err(StressError::NormalDirection { normal });
         }
         let d = Rotation3::from_axis_angle(&Unit::new_unchecked(n), angle) * along.normalize();
-        let material = &self.materials[self.seats[seat].material];
+        let material = &self.materials[self.sites[site].material];
         let (E, nu) = (material.E, material.nu);
         let G = material.G.unwrap_or(E / (2.0 * (1.0 + nu)));
         let normal = |c: usize| (d[c] * d[c] * (1.0 + nu) - nu) / E;

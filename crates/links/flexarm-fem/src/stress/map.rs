@@ -23,7 +23,7 @@ const SAME_LINK: f64 = 1e-3;
 pub struct StressMap {
     /// Amplitudes by coordinates of the model.
     A: DMatrix<f64>,
-    /// Stress by amplitudes and inertia loads, Pa; six rows per seat.
+    /// Stress by amplitudes and inertia loads, Pa; six rows per site.
     stress: DMatrix<f32>,
     /// Section forces by amplitudes and inertia loads; six rows per plane, none for a mesh.
     section_forces: DMatrix<f32>,
@@ -44,7 +44,7 @@ impl StressMap {
         self.stress.ncols()
     }
 
-    /// Stress by amplitudes and inertia loads, Pa; six rows per seat.
+    /// Stress by amplitudes and inertia loads, Pa; six rows per site.
     pub fn stress(&self) -> &DMatrix<f32> {
         &self.stress
     }

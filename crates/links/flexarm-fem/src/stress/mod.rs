@@ -32,7 +32,7 @@ mod recovery;
 mod tests;
 
 pub use error::{StressError, StressFileError};
-pub use fields::{INERTIA_LOADS, SectionForces, StressFields, StressSeat};
+pub use fields::{INERTIA_LOADS, SectionForces, StressFields, StressSite};
 pub use file::{parse_stress, write_stress};
 pub use map::{StressMap, inertia_loads};
 pub use recovery::{NodalPlace, StressPoint, StressRecovery, von_mises};

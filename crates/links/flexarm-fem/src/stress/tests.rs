@@ -72,7 +72,7 @@ fn a_bar_under_tension_has_force_over_area_at_every_node_of_every_element() {
     for kind in SOLIDS {
         let bar = Bar::new(kind, [4, 2, 2], [1.0, 0.1, 0.05]);
         let fields = bar.reduced(0, |source| source.stress_fields("bar"));
-        let worst = (0..fields.seats.len()).map(|k| {
+        let worst = (0..fields.sites.len()).map(|k| {
             let own: [f64; 6] = std::array::from_fn(|c| f64::from(fields.stress[(6 * k + c, 0)]));
             let off = [own[0] / 200.0 - 1.0, own[1] / 200.0, own[2] / 200.0, own[3] / 200.0];
             off.into_iter().fold(0.0, |worst: f64, off| worst.max(off.abs()))
@@ -98,9 +98,9 @@ fn a_cantilever_under_a_tip_force_has_the_bending_stress_of_beam_theory() {
         let sigma = 0.5 * l * (0.5 * h) / (w * h.powi(3) / 12.0);
         let at = |p: &Vector3<f64>| (p.x - 0.5 * l).abs() < 1e-9 && (p.z.abs() - 0.5 * h).abs() < 1e-9;
         let mut worst = 0.0_f64;
-        for (k, seat) in fields.seats.iter().enumerate().filter(|(_, seat)| at(&seat.position)) {
+        for (k, site) in fields.sites.iter().enumerate().filter(|(_, site)| at(&site.position)) {
             let own = f64::from(fields.stress[(6 * k, 2)]);
-            worst = worst.max((own / sigma + seat.position.z.signum()).abs());
+            worst = worst.max((own / sigma + site.position.z.signum()).abs());
         }
         eprintln!("{}: {worst:.1e}", kind.name());
         assert!(worst < bound && worst > 0.0, "{kind:?}: {worst:e}");
@@ -115,8 +115,8 @@ fn a_rotating_bar_bears_its_own_centrifugal_load() {
     let fields = bar.reduced(0, |source| source.stress_fields("bar"));
     let omega_zz = 6 + 6 + 2; // wrenches, linear and angular accelerations, xx, yy
     let top = 0.5 * bar.material.rho;
-    let off = fields.seats.iter().enumerate().map(|(k, seat)| {
-        let x = seat.position.x;
+    let off = fields.sites.iter().enumerate().map(|(k, site)| {
+        let x = site.position.x;
         (f64::from(fields.stress[(6 * k, omega_zz)]) - top * (1.0 - x * x)).abs() / top
     });
     let off = off.fold(0.0, f64::max);

@@ -86,12 +86,12 @@ impl<'a> Recorder<'a> {
     /// Adds a note for the user; repeated notes only add their line.
     pub(crate) fn note(&mut self, text: &str, span: Span) {
         let line = self.line(span);
-        match self.notes.iter_mut().find(|told| told.text == text && told.file == span.file) {
-            Some(told) => {
-                if !told.lines.contains(&line) {
-                    told.times += 1;
-                    if told.lines.len() < LINES_OF_A_NOTE {
-                        told.lines.push(line);
+        match self.notes.iter_mut().find(|note| note.text == text && note.file == span.file) {
+            Some(note) => {
+                if !note.lines.contains(&line) {
+                    note.times += 1;
+                    if note.lines.len() < LINES_OF_A_NOTE {
+                        note.lines.push(line);
                     }
                 }
             }
@@ -103,7 +103,7 @@ impl<'a> Recorder<'a> {
 
     /// Adds a note about the program as a whole.
     pub(crate) fn note_all(&mut self, text: &str) {
-        if !self.notes.iter().any(|told| told.text == text) {
+        if !self.notes.iter().any(|note| note.text == text) {
             self.notes.push(RepeatedNote { text: text.to_owned(), file: 0, lines: Vec::new(), times: 0 });
         }
     }
@@ -262,9 +262,9 @@ impl<'a> Recorder<'a> {
 
     /// Returns the recorded program.
     pub(crate) fn finish(mut self, name: &str) -> Recorded {
-        self.notes.sort_by_key(|told| (told.file, told.lines.first().copied().unwrap_or(0)));
+        self.notes.sort_by_key(|note| (note.file, note.lines.first().copied().unwrap_or(0)));
         let texts = &self.texts;
-        let notes = self.notes.iter().map(|told| told.as_note(texts)).collect();
+        let notes = self.notes.iter().map(|note| note.as_note(texts)).collect();
         Recorded { program: Program { name: name.to_owned(), items: self.items, notes }, sources: self.sources }
     }
 }

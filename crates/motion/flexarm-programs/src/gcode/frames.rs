@@ -37,9 +37,9 @@ impl Gcode<'_> {
 
     pub(super) fn frame(&self, code: i32) -> Pose {
         let name = if code % 10 == 0 { format!("G{}", code / 10) } else { format!("G{}.{}", code / 10, code % 10) };
-        let told = self.recorder.options.gcode.offsets.iter().find(|(given, _)| given.eq_ignore_ascii_case(&name));
+        let given = self.recorder.options.gcode.offsets.iter().find(|(given, _)| given.eq_ignore_ascii_case(&name));
         let moved = self.moved_frames.get(&code).copied().unwrap_or_else(Vector3::zeros);
-        told.map_or_else(Pose::identity, |(_, X)| *X)
+        given.map_or_else(Pose::identity, |(_, X)| *X)
             * Pose::from_parts(Translation3::from(moved), Rotation3::identity())
     }
 
@@ -103,10 +103,10 @@ impl Gcode<'_> {
                 "the machine's reference point is not known to the robot: give one (`reference_mm`), or take the line out",
             );
         };
-        let told: Vec<usize> = (0..3).filter(|k| values.contains_key(&['X', 'Y', 'Z'][*k])).collect();
+        let given: Vec<usize> = (0..3).filter(|k| values.contains_key(&['X', 'Y', 'Z'][*k])).collect();
         let before = self.motion;
         self.motion = Some(Motion::Rapid);
-        if !told.is_empty() {
+        if !given.is_empty() {
             let goal = self.goal(values, false)?;
             self.step_to(goal, span)?;
         }
@@ -114,7 +114,7 @@ impl Gcode<'_> {
         let home = X * nalgebra::Point3::from(Vector3::from(reference) * 1e-3);
         let mut goal = self.at;
         for k in 0..3 {
-            if told.is_empty() || told.contains(&k) {
+            if given.is_empty() || given.contains(&k) {
                 goal[k] = Some(home[k] - self.offset[k]);
             }
         }

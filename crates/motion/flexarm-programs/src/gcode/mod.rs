@@ -155,8 +155,8 @@ impl<'a> Gcode<'a> {
         if !self.blend_is_told {
             self.recorder.note_all("neither G61 nor G64 is there: the path is kept exactly (G61)");
         }
-        let told = &self.recorder.options.gcode.offsets;
-        if told.is_empty() {
+        let given = &self.recorder.options.gcode.offsets;
+        if given.is_empty() {
             self.recorder
                 .note_all("no place of the work frame (G54) was given: its zero is where the controller's world is");
         }

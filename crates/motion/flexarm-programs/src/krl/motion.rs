@@ -225,10 +225,10 @@ fn target(
 
 /// Axis values; omitted ones are kept.
 fn joints(machine: &mut Krls<'_>, context: &Context, axes: [Option<f64>; 6], span: Span) -> Result<Target> {
-    let told = axes.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
+    let given = axes.iter().rposition(Option::is_some).map_or(0, |last| last + 1);
     let before = machine.recorder.joints().map(<[f64]>::to_vec);
     // Arms with fewer than six axes have fewer values.
-    let count = before.as_ref().map_or(FEWEST_AXES, Vec::len).max(told);
+    let count = before.as_ref().map_or(FEWEST_AXES, Vec::len).max(given);
     let mut joints = Vec::with_capacity(count);
     for k in 0..count {
         let old = before.as_ref().and_then(|before| before.get(k)).copied();
@@ -249,17 +249,17 @@ fn joints(machine: &mut Krls<'_>, context: &Context, axes: [Option<f64>; 6], spa
 }
 
 /// Pose in the base; omitted components are kept.
-fn pose(machine: &mut Krls<'_>, context: &Context, told: [Option<f64>; 6], span: Span) -> Result<Pose> {
+fn pose(machine: &mut Krls<'_>, context: &Context, given: [Option<f64>; 6], span: Span) -> Result<Pose> {
     if context.is_relative {
-        let change = told.map(|value| value.unwrap_or(0.0));
+        let change = given.map(|value| value.unwrap_or(0.0));
         let X_BT = machine.recorder.pose(&context.X_WB, &context.X_FT, span)?;
         return moved_by(X_BT, change, context.in_tool, span);
     }
-    if told.iter().all(Option::is_some) {
-        return Ok(pose_zyx_mm_deg(told.map(|value| value.unwrap_or(0.0))));
+    if given.iter().all(Option::is_some) {
+        return Ok(pose_zyx_mm_deg(given.map(|value| value.unwrap_or(0.0))));
     }
     let mut parts = mm_deg_zyx(&machine.recorder.pose(&context.X_WB, &context.X_FT, span)?);
-    for (part, value) in parts.iter_mut().zip(told) {
+    for (part, value) in parts.iter_mut().zip(given) {
         *part = value.unwrap_or(*part);
     }
     Ok(pose_zyx_mm_deg(parts))
@@ -358,19 +358,19 @@ fn target_point(machine: &mut Krls<'_>, context: &Context, arguments: &[Argument
     let Value::Record(record) = &value else {
         return fail(at, format!("an auxiliary point with X, Y, Z is expected, this is {}", value.kind()));
     };
-    let mut told = [None; 6];
-    for (part, name) in told.iter_mut().zip(&CARTESIAN[..3]) {
+    let mut given = [None; 6];
+    for (part, name) in given.iter_mut().zip(&CARTESIAN[..3]) {
         if let Some(value) = record.get(name).filter(|value| !matches!(value, Value::Nothing)) {
             *part = Some(value.number(at)?);
         }
     }
-    if told.iter().all(Option::is_none) {
+    if given.iter().all(Option::is_none) {
         return fail(at, "an auxiliary point with X, Y, Z is expected");
     }
-    if !context.is_relative && told[..3].iter().all(Option::is_some) {
-        return Ok(Vector3::new(told[0].unwrap_or(0.0), told[1].unwrap_or(0.0), told[2].unwrap_or(0.0)) * 1e-3);
+    if !context.is_relative && given[..3].iter().all(Option::is_some) {
+        return Ok(Vector3::new(given[0].unwrap_or(0.0), given[1].unwrap_or(0.0), given[2].unwrap_or(0.0)) * 1e-3);
     }
-    Ok(pose(machine, context, told, at)?.translation.vector)
+    Ok(pose(machine, context, given, at)?.translation.vector)
 }
 
 /// End of an arc with a given angle, if its start is known.

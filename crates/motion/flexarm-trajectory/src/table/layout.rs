@@ -223,7 +223,7 @@ impl Table<'_> {
     /// The column that a text refers to: by number, full name, name without its unit, or name with
     /// another unit.
     fn column(&self, asked: &str) -> Result<(usize, Option<Unit>), Located> {
-        let (bare, told, unknown) = name_and_unit(asked);
+        let (bare, stated, unknown) = name_and_unit(asked);
         let missing = || {
             let (asked, found) = (asked.to_owned(), self.names.clone());
             at(self.header_line, Problem::NoSuchColumn { asked, found })
@@ -231,7 +231,7 @@ impl Table<'_> {
         if let Some(digits) = bare.strip_prefix('#') {
             let place: usize = digits.trim().parse().map_err(|_| missing())?;
             let place = place.checked_sub(1).filter(|place| *place < self.names.len()).ok_or_else(missing)?;
-            return Ok((place, told.or_else(|| self.unit_of(place))));
+            return Ok((place, stated.or_else(|| self.unit_of(place))));
         }
         if let Some(place) = self.names.iter().position(|name| name == asked) {
             return Ok((place, self.unit_of(place)));
@@ -243,7 +243,7 @@ impl Table<'_> {
         let matching = |name: &String| *name == bare || name_and_unit(name).0 == bare;
         let places: Vec<usize> = (0..self.names.len()).filter(|place| matching(&self.names[*place])).collect();
         match places[..] {
-            [place] => Ok((place, told.or_else(|| self.unit_of(place)))),
+            [place] => Ok((place, stated.or_else(|| self.unit_of(place)))),
             [] => Err(missing()),
             _ => {
                 let columns = places.iter().map(|place| self.names[*place].clone()).collect();

@@ -28,8 +28,8 @@ pub(super) fn ranges(points: &[Vec<(f64, f64)>], logarithmic: bool) -> Option<(R
     let y = if logarithmic {
         0.7 * low.max(high / MAX_DECADES)..1.5 * high
     } else {
-        let room = 0.05 * (high - low).max(1e-9 * high.abs()).max(1e-12);
-        low - room..high + room
+        let margin = 0.05 * (high - low).max(1e-9 * high.abs()).max(1e-12);
+        low - margin..high + margin
     };
     Some((x_low..if x_high > x_low { x_high } else { x_low + 1.0 }, y))
 }

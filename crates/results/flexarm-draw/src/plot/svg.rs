@@ -49,7 +49,7 @@ pub(crate) struct Axes<'a> {
     /// From left to right and from bottom to top; from top to bottom if the end is smaller.
     pub(crate) ranges: [Range<f64>; 2],
     /// Space for numbers on the left and below (pixels).
-    pub(crate) room: [u32; 2],
+    pub(crate) margin: [u32; 2],
     /// Names at 0, 1, 2, ... instead of numbers.
     pub(crate) names: [Option<&'a [String]>; 2],
 }
@@ -57,7 +57,7 @@ pub(crate) struct Axes<'a> {
 /// Draws a chart with its axes, and grid lines at their numbers.
 pub(crate) fn axes<'a, 'b>(
     area: &Area<'b>,
-    Axes { ranges: [x, y], room: [left, below], names }: Axes<'_>,
+    Axes { ranges: [x, y], margin: [left, below], names }: Axes<'_>,
 ) -> Result<Chart<'a, 'b, RangedCoordf64, RangedCoordf64>, PlotError> {
     let (width, height) = area.dim_in_pixel();
     let mut chart = ChartBuilder::on(area).y_label_area_size(left).x_label_area_size(below).build_cartesian_2d(x, y)?;
@@ -67,9 +67,9 @@ pub(crate) fn axes<'a, 'b>(
         Some(_) => String::new(),
     };
     // At most as many labels as there is space for.
-    let most = |k: usize, room: usize| match names[k] {
-        None => (room / 40).max(3),
-        Some(names) => (room / [44, 14][k]).clamp(1, names.len().max(1)),
+    let most = |k: usize, margin: usize| match names[k] {
+        None => (margin / 40).max(3),
+        Some(names) => (margin / [44, 14][k]).clamp(1, names.len().max(1)),
     };
     chart
         .configure_mesh()

@@ -80,10 +80,10 @@ pub type McapRecorder = FileRecorder<McapFile>;
 
 /// Returns the stamp of a simulated time in a file whose time zero is `start_ns`.
 fn stamp(path: &Path, start_ns: u64, time_s: f64) -> Result<Stamp, LogError> {
-    let room_ns = Stamp::MAX.saturating_sub(start_ns);
+    let limit_ns = Stamp::MAX.saturating_sub(start_ns);
     let time_ns = (time_s * 1e9).round();
-    if !(0.0..=room_ns as f64).contains(&time_ns) || start_ns > Stamp::MAX {
-        return Err(LogError::Time { path: path.to_owned(), time_s, limit_s: room_ns as f64 * 1e-9 });
+    if !(0.0..=limit_ns as f64).contains(&time_ns) || start_ns > Stamp::MAX {
+        return Err(LogError::Time { path: path.to_owned(), time_s, limit_s: limit_ns as f64 * 1e-9 });
     }
     Ok(Stamp(start_ns + time_ns as u64))
 }

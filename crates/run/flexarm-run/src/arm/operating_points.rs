@@ -44,7 +44,7 @@ impl OperatingPoints {
         self.elastic
     }
 
-    fn with_room(poses: usize, elastic: usize) -> Self {
+    fn with_capacity(poses: usize, elastic: usize) -> Self {
         let holes = |n: usize| vec![f64::NAN; n * poses];
         Self {
             tcp_m: holes(3),
@@ -103,7 +103,7 @@ impl Arm {
         let start = self.operating_point()?;
         let elastic = self.model.n_elastic();
         // Empty chunks would end the iteration: a rigid arm gets one column, dropped later.
-        let mut found = OperatingPoints::with_room(poses.len() / joints, elastic.max(1));
+        let mut found = OperatingPoints::with_capacity(poses.len() / joints, elastic.max(1));
         let rows = found
             .tcp_m
             .par_chunks_mut(3 * CHUNK)

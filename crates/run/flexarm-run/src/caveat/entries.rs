@@ -86,10 +86,10 @@ fn of_gauge(gauge: &Gauge, links: &[RobotLink]) -> Vec<Caveat> {
             (at - axis * along).norm()
         };
         let off = distance(&gauge.at);
-        let room = 0.0..=ON_SECTION * size;
-        let likely = match room.contains(&distance(&(gauge.at * 1e-3))) {
+        let range = 0.0..=ON_SECTION * size;
+        let likely = match range.contains(&distance(&(gauge.at * 1e-3))) {
             true => "millimetres?".to_owned(),
-            false => slip(off, &room, slip::LENGTH, 1.0),
+            false => slip(off, &range, slip::LENGTH, 1.0),
         };
         let caveat = kinds::GAUGE_PLACE.found(format!("gauge {:?}", gauge.name), off, ON_SECTION * size).likely(likely);
         caveats.extend((off > ON_SECTION * size).then_some(caveat));

@@ -100,10 +100,10 @@ fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     // Only the worst link is reported: a wrong unit usually applies to the whole file.
     let widest = with_mass().map(|(name, i)| (gyration(&i), name)).max_by(|a, b| a.0.total_cmp(&b.0));
-    let room = if far_out > 0.0 { 2.0 * far_out } else { LONGEST };
-    if let Some((radius, name)) = widest.filter(|(radius, _)| *radius > room) {
+    let limit = if far_out > 0.0 { 2.0 * far_out } else { LONGEST };
+    if let Some((radius, name)) = widest.filter(|(radius, _)| *radius > limit) {
         let caveat = kinds::INERTIA.found(format!("link {name:?}"), radius, far_out);
-        caveats.push(caveat.likely(slip(radius, &(0.0..=0.5 * room), slip::INERTIA, 0.5)));
+        caveats.push(caveat.likely(slip(radius, &(0.0..=0.5 * limit), slip::INERTIA, 0.5)));
     }
     let dense: Vec<_> = with_mass().filter(|(_, i)| gyration(i) > 0.0 && least_density(i) > OSMIUM).collect();
     let share = dense.iter().map(|(_, i)| i.mass).sum::<f64>() / size.mass;
@@ -168,10 +168,10 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
     if high > (low + middle) * (1.0 + 1e-6) {
         caveats.push(kinds::TRIANGLE.found(what, high, low + middle));
     }
-    let (radius, room) = (gyration(inertia), size.extent.max(0.2));
-    if radius > room {
+    let (radius, limit) = (gyration(inertia), size.extent.max(0.2));
+    if radius > limit {
         let caveat = kinds::PAYLOAD_INERTIA.found(what, radius, size.extent);
-        caveats.push(caveat.likely(slip(radius, &(0.0..=0.5 * room), slip::INERTIA, 0.5)));
+        caveats.push(caveat.likely(slip(radius, &(0.0..=0.5 * limit), slip::INERTIA, 0.5)));
     }
     let density = least_density(inertia);
     caveats.extend((density > OSMIUM).then(|| kinds::DENSITY.found(what, density, OSMIUM)));

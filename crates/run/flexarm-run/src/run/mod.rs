@@ -494,7 +494,7 @@ fn tool_monitor(
     let first_hz = plant.modes.frequencies_hz().first().copied().unwrap_or(0.0);
     let settings = MetricSettings { settling_band_m: options.settling_band_m, lowest_hz: RINGING_FROM * first_hz };
     let record = LongRecord::new(moves(motion), rests_there, settings);
-    ToolMonitor::new(path, static_part, record.with_room((duration / sample_s) as usize + 2))
+    ToolMonitor::new(path, static_part, record.with_capacity((duration / sample_s) as usize + 2))
 }
 
 /// Returns the start and end of each move (s).

@@ -75,7 +75,7 @@ impl AtRest {
 
 /// Operating point under a load, the parameters there, and the pose and wrench for which it was
 /// solved last.
-struct Room<'a> {
+struct Workspace<'a> {
     at: Vector3<f64>,
     carried: SpatialInertia,
     point: OperatingPoint,
@@ -89,13 +89,14 @@ struct Workspaces<'a> {
     parameters: &'a [Parameter],
     /// Coordinates of the parameters.
     x: Vec<f64>,
-    known: Vec<Room<'a>>,
+    known: Vec<Workspace<'a>>,
 }
 
 impl<'a> Workspaces<'a> {
     /// Returns the operating point at a pose under a load.
-    fn solved(&mut self, q: &[f64], load: &LoadCase) -> Result<&mut Room<'a>, StepError> {
-        let known = self.known.iter().position(|room| room.at == load.at && room.carried == load.carried);
+    fn solved(&mut self, q: &[f64], load: &LoadCase) -> Result<&mut Workspace<'a>, StepError> {
+        let known =
+            self.known.iter().position(|workspace| workspace.at == load.at && workspace.carried == load.carried);
         let number = match known {
             Some(number) => number,
             None => {
@@ -104,17 +105,17 @@ impl<'a> Workspaces<'a> {
                 let frame = Frame { name: tool.name.clone(), body: tool.body, X_BF: tool.X_BF * X };
                 let point = OperatingPoint::new(self.loaded(&load.carried).at_rest(q)?, frame);
                 let parameters = self.under(&load.carried);
-                self.known.push(Room { at: load.at, carried: load.carried, point, parameters, solved: None });
+                self.known.push(Workspace { at: load.at, carried: load.carried, point, parameters, solved: None });
                 self.known.len() - 1
             }
         };
-        let room = &mut self.known[number];
-        if !room.solved.as_ref().is_some_and(|(at, wrench)| at == q && *wrench == load.wrench) {
-            room.solved = None;
-            room.point.solve(q, &load.wrench)?;
-            room.solved = Some((q.to_vec(), load.wrench));
+        let workspace = &mut self.known[number];
+        if !workspace.solved.as_ref().is_some_and(|(at, wrench)| at == q && *wrench == load.wrench) {
+            workspace.solved = None;
+            workspace.point.solve(q, &load.wrench)?;
+            workspace.solved = Some((q.to_vec(), load.wrench));
         }
-        Ok(room)
+        Ok(workspace)
     }
 
     /// Solves for a frame at rest at a pose under a load; `None` for the tool.
@@ -128,7 +129,7 @@ impl<'a> Workspaces<'a> {
         let own = frame.cloned().unwrap_or_else(|| self.nominal.tool.clone());
         let turn = tool_shift(self.parameters, &self.x).1;
         let all = self.parameters;
-        let Room { point: at, parameters, .. } = self.solved(q, load)?;
+        let Workspace { point: at, parameters, .. } = self.solved(q, load)?;
         let X_WF = at.pose_of(&own);
         if !slopes {
             return Ok(AtRest { X_WF, slopes: None });
@@ -190,11 +191,11 @@ impl MeasuredArm<'_> {
     /// # Errors
     /// [`NoAnswer`] if the arm has no solution for a reading.
     pub fn predicted(&self, unknowns: &DVector<f64>) -> Result<Vec<f64>, NoAnswer> {
-        let mut rooms = self.rooms(unknowns);
+        let mut workspaces = self.workspaces(unknowns);
         let own = &unknowns.as_slice()[self.parameters.len()..];
         let mut values = Vec::new();
         for reading in &self.measurements.readings {
-            values.extend(self.block(&mut rooms, reading, own, false)?.values);
+            values.extend(self.block(&mut workspaces, reading, own, false)?.values);
         }
         Ok(values)
     }
@@ -228,11 +229,11 @@ impl MeasuredArm<'_> {
     /// # Errors
     /// [`NoAnswer`] if the arm has no solution for a reading.
     pub fn assurances(&self, unknowns: &DVector<f64>) -> Result<Vec<(usize, usize, f64)>, NoAnswer> {
-        let rooms = self.rooms(unknowns);
+        let workspaces = self.workspaces(unknowns);
         let mut all = Vec::new();
         for (number, reading) in self.measurements.readings.iter().enumerate() {
             let ReadingKind::Shape(shape) = &reading.kind else { continue };
-            let nominal = rooms.loaded(&shape.load.carried);
+            let nominal = workspaces.loaded(&shape.load.carried);
             let found = structure_slopes(&nominal, &[], &reading.q, &shape.probes);
             let found = found.map_err(|source| NoAnswer { reading: reading.name.clone(), source })?;
             all.extend(shape.likeliest(&found).map(|(mode, assurance, _)| (number, mode, assurance)));
@@ -253,7 +254,7 @@ impl MeasuredArm<'_> {
         all
     }
 
-    fn rooms(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
+    fn workspaces(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
         let x = unknowns.as_slice()[..self.parameters.len()].to_vec();
         Workspaces {
             nominal: self.nominal.with(self.parameters, &x),
@@ -267,7 +268,7 @@ impl MeasuredArm<'_> {
     /// `slopes`.
     fn block(
         &self,
-        rooms: &mut Workspaces<'_>,
+        workspaces: &mut Workspaces<'_>,
         reading: &Reading,
         own: &[f64],
         slopes: bool,
@@ -275,11 +276,11 @@ impl MeasuredArm<'_> {
         let named = |source| NoAnswer { reading: reading.name.clone(), source };
         match &reading.kind {
             ReadingKind::Displacement { before, after, point, rows } => {
-                self.displacement(rooms, &reading.q, [before, after], point, rows, own, slopes).map_err(named)
+                self.displacement(workspaces, &reading.q, [before, after], point, rows, own, slopes).map_err(named)
             }
             ReadingKind::Place { load, target, instrument, rows } => {
                 let link = self.measurements.links.get(*target).and_then(Option::as_ref);
-                let at = rooms.at_rest(&reading.q, load, link, slopes).map_err(named)?;
+                let at = workspaces.at_rest(&reading.q, load, link, slopes).map_err(named)?;
                 let whole = self.place(&at, *target, *instrument, own);
                 let axes: Vec<usize> = rows.iter().map(|row| row.of).collect();
                 let values = axes.iter().map(|axis| whole.values[*axis]).collect();
@@ -288,7 +289,7 @@ impl MeasuredArm<'_> {
             ReadingKind::Known { parameter, .. } => {
                 // A parameter that is not fitted stays at zero.
                 let number = self.parameters.iter().position(|p| p.name == *parameter);
-                let value = number.map_or(0.0, |k| rooms.x[k]);
+                let value = number.map_or(0.0, |k| workspaces.x[k]);
                 let columns = if slopes { self.parameters.len() + own.len() } else { 0 };
                 let slope = |_, j: usize| f64::from(u8::from(Some(j) == number));
                 Ok(Block { values: vec![value], slopes: DMatrix::from_fn(1, columns, slope) })
@@ -303,17 +304,19 @@ impl MeasuredArm<'_> {
                 Ok(self.instrument_at(*instrument, value, std.is_some(), own, slopes))
             }
             ReadingKind::Frequencies { load, rows } => {
-                let nominal = rooms.loaded(&load.carried);
-                let parameters = if slopes { rooms.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+                let nominal = workspaces.loaded(&load.carried);
+                let parameters = if slopes { workspaces.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
                 let found = frequency_slopes(&nominal, &parameters, &reading.q).map_err(named)?;
                 let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
                 let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
                 Ok(Block { values, slopes })
             }
             ReadingKind::Response(measured) => {
-                self.response(rooms, &reading.q, measured, own.len(), slopes).map_err(named)
+                self.response(workspaces, &reading.q, measured, own.len(), slopes).map_err(named)
             }
-            ReadingKind::Shape(measured) => self.shape(rooms, &reading.q, measured, own.len(), slopes).map_err(named),
+            ReadingKind::Shape(measured) => {
+                self.shape(workspaces, &reading.q, measured, own.len(), slopes).map_err(named)
+            }
         }
     }
 
@@ -365,14 +368,14 @@ impl MeasuredArm<'_> {
 
     fn response(
         &self,
-        rooms: &Workspaces<'_>,
+        workspaces: &Workspaces<'_>,
         q: &[f64],
         measured: &MeasuredResponse,
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let nominal = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let nominal = workspaces.loaded(&measured.load.carried);
+        let parameters = if slopes { workspaces.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
         let probes = [measured.watched.clone(), measured.hit.clone()];
         let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
         let found = structure_slopes(&nominal, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
@@ -386,14 +389,14 @@ impl MeasuredArm<'_> {
 
     fn shape(
         &self,
-        rooms: &Workspaces<'_>,
+        workspaces: &Workspaces<'_>,
         q: &[f64],
         measured: &MeasuredShape,
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let nominal = rooms.loaded(&measured.load.carried);
-        let parameters = if slopes { rooms.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let nominal = workspaces.loaded(&measured.load.carried);
+        let parameters = if slopes { workspaces.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
         let found = structure_slopes(&nominal, &parameters, q, &measured.probes)?;
         let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
         let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
@@ -481,7 +484,7 @@ impl MeasuredArm<'_> {
     #[expect(clippy::too_many_arguments, reason = "what a displacement is made of")]
     fn displacement(
         &self,
-        rooms: &mut Workspaces<'_>,
+        workspaces: &mut Workspaces<'_>,
         q: &[f64],
         loads: [&LoadCase; 2],
         point: &Vector3<f64>,
@@ -489,8 +492,8 @@ impl MeasuredArm<'_> {
         own: &[f64],
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let before = rooms.at_rest(q, loads[0], None, slopes)?;
-        let after = rooms.at_rest(q, loads[1], None, slopes)?;
+        let before = workspaces.at_rest(q, loads[0], None, slopes)?;
+        let after = workspaces.at_rest(q, loads[1], None, slopes)?;
         let moved = after.point(point) - before.point(point);
         let turn = after.X_WF.rotation * before.X_WF.rotation.inverse();
         let turned = rotation_vector(turn.matrix());
@@ -538,14 +541,14 @@ impl Residuals for MeasuredArm<'_> {
 
     fn evaluate(&self, unknowns: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, NoAnswer> {
         let own = &unknowns.as_slice()[self.parameters.len()..];
-        let mut rooms = self.rooms(unknowns);
+        let mut workspaces = self.workspaces(unknowns);
         let m = self.measurements.rows();
         let mut residuals = DVector::zeros(m);
         let observed = self.observed();
         let slopes = J.is_some();
         let mut all = DMatrix::zeros(if slopes { m } else { 0 }, unknowns.len());
         for (reading, first) in self.by_pose() {
-            let block = self.block(&mut rooms, reading, own, slopes)?;
+            let block = self.block(&mut workspaces, reading, own, slopes)?;
             for (i, value) in block.values.iter().enumerate() {
                 residuals[first + i] = value - observed[first + i];
             }

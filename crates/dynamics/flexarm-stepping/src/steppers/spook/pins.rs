@@ -49,11 +49,11 @@ impl Pins {
     pub(super) fn new(model: &Model) -> Self {
         let (n, count) = (model.bodies().len(), 2 * model.loops().len());
         let zero = Row { G: [Vector6::zeros(); 2], c: 0.0 };
-        let room = || vec![Vector6::zeros(); n];
+        let zeros = || vec![Vector6::zeros(); n];
         Self {
             rows: vec![zero; count],
             bodies: model.loops().iter().flat_map(|own| [own.ends; 2]).collect(),
-            columns: (0..count).map(|_| (room(), room())).collect(),
+            columns: (0..count).map(|_| (zeros(), zeros())).collect(),
             A: DMatrix::zeros(count, count),
             mu: DVector::zeros(count),
         }

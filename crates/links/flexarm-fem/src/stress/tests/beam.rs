@@ -33,20 +33,20 @@ fn a_beam_has_the_stress_of_a_solid_bar_under_every_load_and_acceleration() {
     let section = Section::Rectangle { width: size[1], height: size[2] };
     let beam = fields_of(&BeamLink::new("bar", section, PLAIN, size[0]));
     let mut worst = [0.0_f64; 18];
-    for (k, seat) in beam.seats.iter().enumerate().filter(|(_, seat)| (seat.position.x - 0.5).abs() < 1e-9) {
-        let of_solid = (0..solid.seats.len()).find(|m| (solid.seats[*m].position - seat.position).norm() < 1e-9);
+    for (k, site) in beam.sites.iter().enumerate().filter(|(_, site)| (site.position.x - 0.5).abs() < 1e-9) {
+        let of_solid = (0..solid.sites.len()).find(|m| (solid.sites[*m].position - site.position).norm() < 1e-9);
         let m = of_solid.unwrap();
-        let is_corner = seat.position.y != 0.0 && seat.position.z != 0.0;
+        let is_corner = site.position.y != 0.0 && site.position.z != 0.0;
         for (j, worst) in worst.iter_mut().enumerate() {
             // At its corners the stress of the mesh in torsion converges slowly to zero.
             if is_corner && TORSION.contains(&j) {
                 continue;
             }
-            let six = |fields: &StressFields, seat: usize| -> Vector6<f64> {
-                Vector6::from_fn(|c, _| f64::from(fields.stress[(6 * seat + c, j)]))
+            let six = |fields: &StressFields, site: usize| -> Vector6<f64> {
+                Vector6::from_fn(|c, _| f64::from(fields.stress[(6 * site + c, j)]))
             };
-            let scale = (0..beam.seats.len())
-                .filter(|k| (beam.seats[*k].position.x - 0.5).abs() < 1e-9)
+            let scale = (0..beam.sites.len())
+                .filter(|k| (beam.sites[*k].position.x - 0.5).abs() < 1e-9)
                 .map(|k| six(&beam, k).amax())
                 .fold(0.0, f64::max);
             let off = (six(&beam, k) - six(&solid, m)).amax();
@@ -111,8 +111,8 @@ fn a_beam_beside_the_line_of_its_joints_bears_the_moment_of_the_offset() {
     let fields = fields_of(&link);
     let own = section.properties(0.3).unwrap();
     let pull = 1000.0;
-    let worst = (0..fields.seats.len()).map(|k| {
-        let p = fields.seats[k].position;
+    let worst = (0..fields.sites.len()).map(|k| {
+        let p = fields.sites[k].position;
         // The force acts 0.05 m from the axis, on the side of -y.
         let truth = pull / own.A - pull * 0.05 * (p.y - 0.05) / own.I_y;
         let found = pull * f64::from(fields.stress[(6 * k + 2, 2)]);
@@ -138,7 +138,7 @@ fn the_root_of_a_beam_carries_all_of_its_parts() {
         let fields = link.stress_fields(&joints, &parts).unwrap();
         // An acceleration upward is weight; the top corner of the root is pulled.
         let moment = 24.0 * 9.81 * 0.6;
-        let top = fields.seats.iter().position(|seat| seat.position.x == 0.0 && seat.position.z > 0.069).unwrap();
+        let top = fields.sites.iter().position(|site| site.position.x == 0.0 && site.position.z > 0.069).unwrap();
         let off = (9.81 * f64::from(fields.stress[(6 * top, 6 + 2)]) / (moment * 0.07 / properties.I_y) - 1.0).abs();
         eprintln!("{} parts: {off:.1e}", parts.len());
         assert!(off < 1e-6, "{off:e}");
@@ -180,14 +180,14 @@ fn the_normal_of_the_outline_points_outward_at_every_place() {
         let link = BeamLink::new("link", section, Material::STEEL, 1.0);
         let fields = fields_of(&BeamLink { X_LE: Pose::identity(), ..link });
         let outline = section.outline(0.3).unwrap();
-        for (k, seat) in fields.seats.iter().enumerate() {
+        for (k, site) in fields.sites.iter().enumerate() {
             let normal = fields.normal(k);
             assert!((normal.norm() - 1.0).abs() < 1e-12 && normal.x.abs() < 1e-12, "{section:?} {k}: {normal}");
             // Outside of a convex section; along the tangent turned by a right angle elsewhere.
             let point = outline[k % outline.len()];
             let out = Vector3::new(0.0, point.tangent[1], -point.tangent[0]);
             let is_corner = point.torsion == 0.0;
-            assert!(is_corner || normal.dot(&out) > 0.7, "{section:?} {k}: {normal} {seat:?}");
+            assert!(is_corner || normal.dot(&out) > 0.7, "{section:?} {k}: {normal} {site:?}");
         }
     }
     let given = Section::Given(Section::Circle { diameter: 0.1 }.bar(&Material::STEEL).unwrap());

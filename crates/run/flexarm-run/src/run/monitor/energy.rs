@@ -67,7 +67,7 @@ struct EnergyBook {
     swing: f64,
     /// Maximum sum of the magnitudes of the parts of the energy (J).
     size: f64,
-    struck: f64,
+    impulse_work: f64,
     /// Dissipation by gear hysteresis up to the last sample, and before the first one (J).
     hysteresis: [f64; 2],
     /// Energy exchanged with payloads (J).
@@ -103,11 +103,11 @@ impl EnergyBook {
             self.drives.extend(drives);
         }
         // An impulse at the start is contained in the energy of the first sample.
-        let struck = if self.first.is_some() { impulse_work - self.struck } else { 0.0 };
-        self.work[0] += struck;
-        self.gross[0] += struck.max(0.0);
-        self.gross[1] += (-struck).max(0.0);
-        self.struck = impulse_work;
+        let impulse = if self.first.is_some() { impulse_work - self.impulse_work } else { 0.0 };
+        self.work[0] += impulse;
+        self.gross[0] += impulse.max(0.0);
+        self.gross[1] += (-impulse).max(0.0);
+        self.impulse_work = impulse_work;
         self.last = energy.iter().sum();
         self.size = self.size.max(energy.iter().map(|part| part.abs()).sum());
         self.before = Some((t, power));

@@ -7,17 +7,17 @@ use super::{LinkStress, POLYLINE};
 use crate::robot::strength::Strength;
 
 impl LinkStress {
-    /// Returns the strength at a seat, if it is known.
-    pub(super) fn strength_at(&self, seat: usize) -> Option<Strength> {
-        self.strength.or_else(|| Strength::of(&self.fields.materials[self.fields.seats[seat].material]))
+    /// Returns the strength at a site, if it is known.
+    pub(super) fn strength_at(&self, site: usize) -> Option<Strength> {
+        self.strength.or_else(|| Strength::of(&self.fields.materials[self.fields.sites[site].material]))
     }
 
-    /// Returns the damage of a history of stress (Pa) at a seat; `None` without an S-N curve.
-    pub(super) fn damage(&self, seat: usize, history: &[f64]) -> Option<f64> {
-        Some(self.strength_at(seat)?.curve()?.damage(&rainflow_repeating(history)).min(1.0))
+    /// Returns the damage of a history of stress (Pa) at a site; `None` without an S-N curve.
+    pub(super) fn damage(&self, site: usize, history: &[f64]) -> Option<f64> {
+        Some(self.strength_at(site)?.curve()?.damage(&rainflow_repeating(history)).min(1.0))
     }
 
-    /// Returns the seat of the largest damage; `None` without an S-N curve.
+    /// Returns the site of the largest damage; `None` without an S-N curve.
     ///
     /// Seats are tried in the order of a bound of their damage, until the bound is below the damage
     /// found. The bound: n samples have n/2 cycles at most, and with the largest stress P of positive

@@ -44,9 +44,9 @@ const APART: f64 = 0.05;
 const PLACES: usize = 5;
 /// Stress by which the polyline of the amplitudes may be off, over that of the largest amplitude.
 const POLYLINE: f32 = 2e-3;
-/// Samples and seats evaluated together.
+/// Samples and sites evaluated together.
 const SAMPLES: usize = 128;
-const SEATS: usize = 512;
+const SITES: usize = 512;
 
 /// Monitors the stress of links.
 pub(crate) struct StressMonitor {
@@ -74,7 +74,7 @@ struct LinkStress {
     amplitudes: Vec<f32>,
     /// Poses of the link in the world at all samples.
     poses: Vec<Pose>,
-    /// Maximum von Mises stress of each seat (Pa) with positive and with negative sign, once it is
+    /// Maximum von Mises stress of each site (Pa) with positive and with negative sign, once it is
     /// computed.
     sides: OnceCell<Vec<[f32; 2]>>,
 }
@@ -84,7 +84,7 @@ struct PlacedGauge {
     name: String,
     /// Index into [`StressMonitor::links`].
     link: usize,
-    seat: usize,
+    site: usize,
     /// Strain per stress component (1/Pa) of a strain gauge; `None` for a stress point.
     strain: Option<[f64; 6]>,
 }
@@ -183,7 +183,7 @@ impl StressMonitor {
         values.clear();
         let is_blind = self.times.last() != Some(&seen.t);
         for gauge in &self.gauges {
-            let stress = if is_blind { [f64::NAN; 6] } else { self.links[gauge.link].last_stress(gauge.seat) };
+            let stress = if is_blind { [f64::NAN; 6] } else { self.links[gauge.link].last_stress(gauge.site) };
             match gauge.strain {
                 Some(strain) => values.push(strain.iter().zip(stress).map(|(by, stress)| by * stress).sum()),
                 None if is_blind => values.extend([f64::NAN; 3]),
@@ -202,16 +202,16 @@ impl StressMonitor {
             let own = || self.gauges.iter().filter(move |gauge| gauge.link == number);
             let points = own().filter(|gauge| gauge.strain.is_none()).map(|gauge| StressPointFigures {
                 name: gauge.name.clone(),
-                place: link.place(gauge.seat, &amplitudes, &self.times),
+                place: link.place(gauge.site, &amplitudes, &self.times),
             });
             let strain = |gauge: &PlacedGauge| {
                 let by = RowSVector::<f32, 6>::from(gauge.strain?.map(|by| by as f32));
-                let history = by * link.map.stress().fixed_rows::<6>(6 * gauge.seat) * &amplitudes;
-                let seat = &link.fields.seats[gauge.seat];
+                let history = by * link.map.stress().fixed_rows::<6>(6 * gauge.site) * &amplitudes;
+                let site = &link.fields.sites[gauge.site];
                 Some(StrainGaugeFigures {
                     name: gauge.name.clone(),
-                    node: seat.node,
-                    position_m: seat.position.into(),
+                    node: site.node,
+                    position_m: site.position.into(),
                     lowest: f64::from(history.min()),
                     highest: f64::from(history.max()),
                 })
@@ -235,15 +235,15 @@ impl StressMonitor {
         let Some(sample) = first.1.first().map(|k| first.0.time_of_peak(*k)) else { return Vec::new() };
         let objects = links().flat_map(|(link, worst)| {
             let X_WL = link.poses[sample];
-            let place = |k: usize| (X_WL * Point3::from(link.fields.seats[k].position)).coords.map(|x| x as f32).into();
+            let place = |k: usize| (X_WL * Point3::from(link.fields.sites[k].position)).coords.map(|x| x as f32).into();
             let color = |stress: f32| {
                 let [r, g, b] = magnitude((f64::from(stress) / scale).min(1.0));
                 [r, g, b, 255]
             };
             let surface = SceneryForm::Surface {
-                places: (0..link.fields.seats.len()).map(place).collect(),
+                places: (0..link.fields.sites.len()).map(place).collect(),
                 triangles: link.fields.triangles.clone(),
-                colors: (0..link.fields.seats.len()).map(|k| color(link.peak(k))).collect(),
+                colors: (0..link.fields.sites.len()).map(|k| color(link.peak(k))).collect(),
             };
             let labels = SceneryForm::Points {
                 places: worst.iter().map(|k| place(*k)).collect(),
@@ -304,16 +304,16 @@ fn placed(robot: &Robot, links: &[LinkStress]) -> Result<Vec<PlacedGauge>, Error
         let Some(number) = links.iter().position(|link| link.name == gauge.link) else { continue };
         let fields = &links[number].fields;
         let place = || {
-            let seat = fields.nearest_seat(&gauge.at)?;
-            let strain = gauge.grid.map(|(direction, angle)| fields.strain_by_stress(seat, &direction, angle));
-            Ok::<_, StressError>((seat, strain.transpose()?))
+            let site = fields.nearest_site(&gauge.at)?;
+            let strain = gauge.grid.map(|(direction, angle)| fields.strain_by_stress(site, &direction, angle));
+            Ok::<_, StressError>((site, strain.transpose()?))
         };
         let entry = if gauge.grid.is_some() { "strain_gauge" } else { "stress_point" };
-        let (seat, strain) = place().map_err(|error| Error::File {
+        let (site, strain) = place().map_err(|error| Error::File {
             path: robot.path.clone(),
             what: format!("{entry} {:?}: {error}", gauge.name),
         })?;
-        gauges.push(PlacedGauge { name: gauge.name.clone(), link: number, seat, strain });
+        gauges.push(PlacedGauge { name: gauge.name.clone(), link: number, site, strain });
     }
     Ok(gauges)
 }
@@ -376,7 +376,7 @@ impl LinkStress {
     /// Draws the largest stress of every node.
     #[cfg(feature = "png")]
     fn sheet(&self) -> Image {
-        let positions: Vec<_> = self.fields.seats.iter().map(|seat| seat.position).collect();
+        let positions: Vec<_> = self.fields.sites.iter().map(|site| site.position).collect();
         let [X_LA, X_LB] = [0, 1].map(|k| self.fields.poses[k].translation.vector);
         stress_sheet(&StressPicture {
             link: &self.name,
@@ -390,20 +390,20 @@ impl LinkStress {
         })
     }
 
-    /// Returns the seats that are judged: those that are not near a tied node.
+    /// Returns the sites that are judged: those that are not near a tied node.
     fn judged(&self) -> Vec<usize> {
         let clear = NEAR_TIE * self.length;
-        (0..self.fields.seats.len()).filter(|k| self.fields.seats[*k].from_tie >= clear).collect()
+        (0..self.fields.sites.len()).filter(|k| self.fields.sites[*k].from_tie >= clear).collect()
     }
 
-    /// Returns the worst seats, which are apart from each other.
+    /// Returns the worst sites, which are apart from each other.
     fn worst(&self) -> Vec<usize> {
         let mut order = self.judged();
         order.sort_by(|a, b| self.peak(*b).total_cmp(&self.peak(*a)));
         let mut worst: Vec<usize> = Vec::new();
         for k in order {
-            let p = self.fields.seats[k].position;
-            let is_new = |other: &usize| (p - self.fields.seats[*other].position).norm() > APART * self.length;
+            let p = self.fields.sites[k].position;
+            let is_new = |other: &usize| (p - self.fields.sites[*other].position).norm() > APART * self.length;
             if worst.iter().all(is_new) {
                 worst.push(k);
             }
@@ -414,28 +414,28 @@ impl LinkStress {
         worst
     }
 
-    /// Returns the stress of a seat at the last sample (Pa).
-    fn last_stress(&self, seat: usize) -> [f64; 6] {
+    /// Returns the stress of a site at the last sample (Pa).
+    fn last_stress(&self, site: usize) -> [f64; 6] {
         let last = &self.amplitudes[self.amplitudes.len() - self.map.columns()..];
         let stress = self.map.stress();
         std::array::from_fn(|c| {
             last.iter()
                 .enumerate()
-                .map(|(k, amplitude)| f64::from(stress[(6 * seat + c, k)]) * f64::from(*amplitude))
+                .map(|(k, amplitude)| f64::from(stress[(6 * site + c, k)]) * f64::from(*amplitude))
                 .sum()
         })
     }
 
-    /// Returns the maximum of a seat over the run.
+    /// Returns the maximum of a site over the run.
     fn place(&self, k: usize, amplitudes: &DMatrix<f32>, times: &[f64]) -> StressPlaceFigures {
-        let seat = &self.fields.seats[k];
+        let site = &self.fields.sites[k];
         let history = self.signed_history(k, amplitudes);
         let sample = largest(&history);
         let stress = history[sample].abs();
         let strength = self.strength_at(k);
         StressPlaceFigures {
-            node: seat.node,
-            position_m: seat.position.into(),
+            node: site.node,
+            position_m: site.position.into(),
             t_s: times[sample],
             von_mises_pa: stress,
             of_yield: strength.map(|strength| stress / strength.yield_pa),
@@ -444,9 +444,9 @@ impl LinkStress {
         }
     }
 
-    /// Returns the sample with the largest stress of a seat.
-    fn time_of_peak(&self, seat: usize) -> usize {
-        largest(&self.signed_history(seat, &self.amplitudes()))
+    /// Returns the sample with the largest stress of a site.
+    fn time_of_peak(&self, site: usize) -> usize {
+        largest(&self.signed_history(site, &self.amplitudes()))
     }
 
     /// Returns the worst places over the run.
@@ -456,8 +456,8 @@ impl LinkStress {
         let most_damaged = self.most_damaged(amplitudes).map(|k| self.place(k, amplitudes, times));
         LinkStressFigures {
             name: self.name.clone(),
-            nodes: self.fields.seats.len(),
-            left_out: self.fields.seats.len() - self.judged().len(),
+            nodes: self.fields.sites.len(),
+            left_out: self.fields.sites.len() - self.judged().len(),
             clear_of_ties_m: NEAR_TIE * self.length,
             peak_pa: worst.first().map_or(0.0, |place| place.von_mises_pa),
             of_yield: worst.first().and_then(|place| place.of_yield),
@@ -481,9 +481,9 @@ impl LinkStress {
         sections.x.iter().enumerate().map(extremes).collect()
     }
 
-    /// Returns the signed von Mises stress of a seat over the run (Pa).
-    fn signed_history(&self, seat: usize, amplitudes: &DMatrix<f32>) -> Vec<f64> {
-        let own = self.map.stress().rows(6 * seat, 6) * amplitudes;
+    /// Returns the signed von Mises stress of a site over the run (Pa).
+    fn signed_history(&self, site: usize, amplitudes: &DMatrix<f32>) -> Vec<f64> {
+        let own = self.map.stress().rows(6 * site, 6) * amplitudes;
         own.column_iter().map(|column| signed_von_mises([0, 1, 2, 3, 4, 5].map(|c| f64::from(column[c])))).collect()
     }
 
@@ -496,8 +496,8 @@ impl LinkStress {
         let stress = self.map.stress();
         // Largest stress per unit of each amplitude: bounds the stress of a difference.
         let units = stress.column_iter().map(|column| {
-            let seats = column.as_slice().as_chunks::<6>().0;
-            seats.iter().map(von_mises_squared).fold(0.0, f32::max).sqrt()
+            let sites = column.as_slice().as_chunks::<6>().0;
+            sites.iter().map(von_mises_squared).fold(0.0, f32::max).sqrt()
         });
         let scaled = DMatrix::from_diagonal(&DVector::from_iterator(stress.ncols(), units)) * amplitudes;
         let allowed = POLYLINE * scaled.amax();
@@ -518,13 +518,13 @@ impl LinkStress {
         corners
     }
 
-    /// Returns the maximum von Mises stress of a seat over the run (Pa).
-    fn peak(&self, seat: usize) -> f32 {
-        let [positive, negative] = self.sides()[seat];
+    /// Returns the maximum von Mises stress of a site over the run (Pa).
+    fn peak(&self, site: usize) -> f32 {
+        let [positive, negative] = self.sides()[site];
         positive.max(negative)
     }
 
-    /// Returns the maximum von Mises stress of each seat over the run (Pa) with positive and with
+    /// Returns the maximum von Mises stress of each site over the run (Pa) with positive and with
     /// negative sign.
     fn sides(&self) -> &[[f32; 2]] {
         self.sides.get_or_init(|| {
@@ -539,19 +539,19 @@ impl LinkStress {
     /// of a piece, and so in between. Other pieces count for both signs.
     fn sides_of(&self, amplitudes: &DMatrix<f32>) -> Vec<[f32; 2]> {
         let stress = self.map.stress();
-        let mut sides = vec![[0.0_f32; 2]; self.fields.seats.len()];
+        let mut sides = vec![[0.0_f32; 2]; self.fields.sites.len()];
         // Sign (0 if unknown) and square at the last corner.
-        let mut last = vec![(0.0_f32, 0.0_f32); SEATS];
-        let mut product = DMatrix::zeros(6 * SEATS, SAMPLES);
-        for (block, sides) in sides.chunks_mut(SEATS).enumerate() {
-            let own = stress.rows(6 * SEATS * block, 6 * sides.len());
+        let mut last = vec![(0.0_f32, 0.0_f32); SITES];
+        let mut product = DMatrix::zeros(6 * SITES, SAMPLES);
+        for (block, sides) in sides.chunks_mut(SITES).enumerate() {
+            let own = stress.rows(6 * SITES * block, 6 * sides.len());
             for first in (0..amplitudes.ncols()).step_by(SAMPLES) {
                 let count = SAMPLES.min(amplitudes.ncols() - first);
                 let mut product = product.view_mut((0, 0), (own.nrows(), count));
                 product.gemm(1.0, &own, &amplitudes.columns(first, count), 0.0);
                 for (k, column) in product.column_iter().enumerate() {
-                    let seats = column.as_slice().as_chunks::<6>().0;
-                    for ((side, last), stress) in sides.iter_mut().zip(&mut last).zip(seats) {
+                    let sites = column.as_slice().as_chunks::<6>().0;
+                    for ((side, last), stress) in sides.iter_mut().zip(&mut last).zip(sites) {
                         let square = von_mises_squared(stress);
                         let trace = stress[0] + stress[1] + stress[2];
                         let sign = if 4.0 * trace * trace > square { trace.signum() } else { 0.0 };
