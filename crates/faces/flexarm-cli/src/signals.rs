@@ -62,7 +62,7 @@ impl Drop for Watch {
 
 /// Time that a command may take to stop by itself, and polling interval of stop requests.
 const PATIENCE: Duration = Duration::from_millis(300);
-const LOOK: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Watches a command whose files are complete at any time. If the command has not stopped within
 /// [`PATIENCE`] after a request, the process ends with the exit code that `last_words` returns.
@@ -77,7 +77,7 @@ pub(crate) fn end_if_not_stopped(last_words: impl Fn() -> ExitCode + Send + 'sta
             if watched.load(Ordering::SeqCst) {
                 return;
             }
-            std::thread::sleep(LOOK);
+            std::thread::sleep(POLL_INTERVAL);
         }
         std::thread::sleep(PATIENCE);
         if Watch::is_first(&watched) {

@@ -10,7 +10,7 @@ use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 /// Interval of signal checks.
-const LOOK_EVERY: Duration = Duration::from_millis(25);
+const POLL_INTERVAL: Duration = Duration::from_millis(25);
 /// Time to wait for work that was asked to stop.
 const PATIENCE: Duration = Duration::from_millis(100);
 /// Interval of calls of a progress function.
@@ -33,7 +33,7 @@ impl Watch {
 
     /// Checks signals and reports `done` of `total`; breaks if the run must stop.
     pub(crate) fn look(&mut self, done: f64, total: f64) -> ControlFlow<()> {
-        let looks = self.looked.elapsed() >= LOOK_EVERY;
+        let looks = self.looked.elapsed() >= POLL_INTERVAL;
         let tells = self.progress.is_some() && self.told.elapsed() >= TELL_EVERY;
         if !looks && !tells {
             return ControlFlow::Continue(());
@@ -106,7 +106,7 @@ pub(crate) fn stoppable_telling<T: Send + 'static>(
     let receiver = Mutex::new(receiver);
     let receive = |wait| receiver.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(wait);
     loop {
-        match py.detach(|| receive(LOOK_EVERY)) {
+        match py.detach(|| receive(POLL_INTERVAL)) {
             Ok(value) => {
                 tell(py)?;
                 return Ok(value);

@@ -28,7 +28,7 @@ const BATCHES: usize = QUEUE + 2;
 /// Maximum time between two batches while samples arrive.
 const PAUSE: Duration = Duration::from_millis(20);
 /// Time between two checks of the free disk space.
-const LOOK: Duration = Duration::from_millis(200);
+const POLL_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Consecutive samples.
 #[derive(Default)]
@@ -122,7 +122,7 @@ impl Threads {
             let _ = worker.queue.send(Message::Samples(self.batches[0].clone()));
         }
         self.handed_over = Instant::now();
-        if self.handed_over - self.looked >= LOOK {
+        if self.handed_over - self.looked >= POLL_INTERVAL {
             (self.scarce, self.looked) = (is_scarce(&self.folder), self.handed_over);
         }
         if self.scarce {

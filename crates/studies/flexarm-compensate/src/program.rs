@@ -30,7 +30,7 @@ pub(super) const FOLDER: &str = "program";
 const NAMED: usize = 20;
 
 /// Number of times per rest at which loads are sampled.
-const LOOKS: u32 = 200;
+const SAMPLES: u32 = 200;
 /// Deviation of a load from its mean during a rest, relative to its maximum, above which it is
 /// reported.
 const CHANGES: f64 = 0.1;
@@ -326,8 +326,8 @@ impl<'a> AtRest<'a> {
 
     /// Returns the wrenches of all loads at sampling times of a rest (or at its single time).
     fn samples(&self, [from, to]: [f64; 2]) -> impl Iterator<Item = Vec<Wrench>> {
-        let at = move |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(LOOKS);
-        (0..LOOKS).map(move |k| self.loads.iter().map(|load| load.wrench.at(at(k))).collect())
+        let at = move |k: u32| from + (to - from) * (f64::from(k) + 0.5) / f64::from(SAMPLES);
+        (0..SAMPLES).map(move |k| self.loads.iter().map(|load| load.wrench.at(at(k))).collect())
     }
 
     /// Whether a load or a changed payload acts during a rest.
@@ -342,7 +342,7 @@ impl<'a> AtRest<'a> {
     fn change(&self, rest_s: [f64; 2]) -> Option<f64> {
         let all: Vec<Vec<Wrench>> = self.samples(rest_s).collect();
         let each = (0..self.loads.len()).filter_map(|k| {
-            let mean = all.iter().fold(Wrench::zeros(), |sum, F| sum + F[k] * (1.0 / f64::from(LOOKS)));
+            let mean = all.iter().fold(Wrench::zeros(), |sum, F| sum + F[k] * (1.0 / f64::from(SAMPLES)));
             let largest = all.iter().map(|F| F[k].force.norm()).fold(0.0, f64::max);
             let off = all.iter().map(|F| (F[k].force - mean.force).norm()).fold(0.0, f64::max);
             (largest > 0.0).then(|| off / largest)

@@ -74,7 +74,7 @@ const PAGE: &str = "report.html";
 /// Maximum number of quick runs that a thread takes at a time.
 const WINDOW: usize = 64;
 /// Interval between two calls of the progress function, which can stop the runs.
-const LOOK: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
 /// Functions that find robots and motions by name.
 #[derive(Clone, Copy, Debug)]
@@ -294,7 +294,7 @@ impl Sweep {
             }
             drop(sender);
             loop {
-                match receiver.recv_timeout(LOOK) {
+                match receiver.recv_timeout(POLL_INTERVAL) {
                     Ok(answer) if failed.is_none() => match keep(answer) {
                         Ok(()) => done += 1,
                         Err(error) => {

@@ -84,7 +84,7 @@ impl ModalSource<'_> {
         let stress = recovery.at_nodes(&U, &places);
         let columns = U.ncols();
         let stress = |row: usize, j: usize| stress[row / 6 * columns + j][row % 6] as f32;
-        // A triangle has the seats of the first material at its nodes.
+        // A triangle has the sites of the first material at its nodes.
         let mut site_of = vec![u32::MAX; self.mesh.nodes.len()];
         for (k, place) in places.iter().enumerate().rev() {
             site_of[place.node as usize] = k as u32;

@@ -25,7 +25,7 @@ const HINTED: f64 = 3.0;
 /// Maximum ratio of a strong gear's rotation to the median of the robot's other strong gears:
 /// shipped robots have up to 7.5, up to 15 if one gear is half as stiff, and most exceed it if one
 /// gear is given in N m/deg.
-const ODD: f64 = 16.0;
+const MAX_ROTATION_RATIO: f64 = 16.0;
 /// Rotation below which gears are too stiff (rad): note, warning.
 const RIGID: [f64; 2] = [1e-4, 1e-5];
 /// Elastic rotation of gears under gravity (rad): note, warning; for strong drives and weak ones.
@@ -138,7 +138,7 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     let factors: Vec<slip::Factor> = slip::TURNING.iter().map(|(f, words)| (1.0 / f, *words)).collect();
     let likely = || slip(turned, &sound, &factors, 1.0);
     if effort.is_finite() && turned > unusual {
-        let wrong = if others.is_some_and(|others| turned > ODD * others) { unusual } else { wrong };
+        let wrong = if others.is_some_and(|others| turned > MAX_ROTATION_RATIO * others) { unusual } else { wrong };
         let hinted = turned > wrong || (effort > STRONG && turned > HINTED * unusual);
         let caveat = kinds::GEAR_SOFT.found(name(drive), turned, unusual);
         let caveat = if hinted { caveat.likely(likely()) } else { caveat };

@@ -15,7 +15,7 @@ const FAR: (f64, f64) = (1.5, 2.0);
 /// Maximum length of an arm (m); concrete pumps reach 70 m.
 const LONGEST: f64 = 100.0;
 /// Maximum distance of a joint from its parent, relative to that of all other joints together.
-const ODD_DISTANCE: f64 = 20.0;
+const MAX_DISTANCE_RATIO: f64 = 20.0;
 /// Maximum plausible angle in a file (rad): one turn.
 const TURN: f64 = std::f64::consts::TAU;
 /// Payload mass relative to the robot's mass: implausible, unusual.
@@ -80,9 +80,9 @@ fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item
     let odd = mechanism.joints.iter().filter_map(move |joint| {
         let (own, others) = (length(joint), all - length(joint));
         let sound = 0.0..=others.max(1.0);
-        let is_odd = own > LONGEST || (others > 1e-3 && own > ODD_DISTANCE * others && own > FAR.1);
+        let is_far = own > LONGEST || (others > 1e-3 && own > MAX_DISTANCE_RATIO * others && own > FAR.1);
         let caveat = || kinds::JOINT_DISTANCE.found(format!("joint {:?}", joint.name), own, others);
-        is_odd.then(|| caveat().likely(slip(own, &sound, slip::LENGTH, 1.0)))
+        is_far.then(|| caveat().likely(slip(own, &sound, slip::LENGTH, 1.0)))
     });
     let long = || kinds::SIZE.found("the arm", size.extent, LONGEST);
     let long = (size.extent > LONGEST).then(|| long().likely(slip(size.extent, &(0.05..=30.0), slip::LENGTH, 1.0)));
