@@ -10,7 +10,7 @@ use flexarm::poses::{
 
 use crate::failure::Failure;
 use crate::layout::{lines, table};
-use crate::posed_args::{ModesArgs, PoseArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
+use crate::posed_args::{ModesArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
 use crate::print::caveats;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json};

@@ -6,10 +6,11 @@
 //! The library exports the functions of FMI 2.0, those of FMI 3.0 and those of
 //! `include/flexarm.h`; the same plant stands behind all three.
 //!
-//! ```no_run
+//! ```
 //! use std::path::Path;
 //! use flexarm_fmu::{FmuModel, FmuSettings};
 //!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
 //! let mut arm = FmuModel::new(Path::new("robots/kr210"), &FmuSettings::default())?;
 //! let height = arm.find("tcp.position.z").ok_or("no such variable")?;
 //! arm.start(0.0)?;

@@ -118,7 +118,7 @@ impl FmuModel {
         };
         let variables: Arc<[Variable]> = variables(&arm, &starts).into();
         let values = variables.iter().map(|variable| variable.start.unwrap_or(0.0)).collect();
-        let (path, settings, states) = (robot.path, settings.clone(), StateReferences::of(&variables));
+        let (path, settings, states) = (robot.path.clone(), settings.clone(), StateReferences::of(&variables));
         let (running, previewed) = (Some(Running::Steps(Box::new(live))), None);
         let (begin_s, steps) = (0.0, 0);
         let mut model = Self { path, settings, arm, variables, values, states, running, previewed, begin_s, steps };

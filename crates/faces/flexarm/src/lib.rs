@@ -1,10 +1,11 @@
 //! Facade of the flexarm workspace: from a robot file and a trajectory to a result.
 //!
-//! ```no_run
+//! ```
 //! use flexarm::{Modelling, Motion, Robot, RunOptions, Wrench};
 //!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
 //! let robot = Robot::load("robots/kr210")?;
-//! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
+//! let motion = Motion::load("trajectories/point_to_point.toml", &robot)?;
 //! let arm = robot.model(&Modelling::default())?; // substitution once
 //! let run = arm.simulate(&motion, &RunOptions::default())?;
 //! let (t, e) = (run.time_s(), run.error_world_m()); // n, and n x 3, row after row

@@ -21,7 +21,9 @@ pub struct Mounting {
     pub name: String,
     /// Pose of the spring frame S in the base link.
     pub X_BS: Pose,
-    /// Stiffness at So in S axes (N/m, N/rad; N m/m, N m/rad).
+    /// Stiffness at So in S axes, forces before moments (N/m, N/rad; N m/m, N m/rad), as in
+    /// [`crate::ElasticJoint`]; [`insert_mounting`] checks that it is symmetric and positive
+    /// definite.
     pub K_S: Matrix6<f64>,
     /// Whether the six springs of a diagonal stiffness act one after another, each with its own
     /// law.

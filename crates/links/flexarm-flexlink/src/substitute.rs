@@ -73,7 +73,18 @@ pub enum Parts {
     FromLink(f64),
 }
 
-/// Elastic joint of a lumped flexible link.
+/// Elastic joint of a lumped flexible link, between its proximal part P and its distal part Q.
+///
+/// ```text
+/// [ f ]   [ K_tt   K_tr ] [ d ]       f (N), t (N m): wrench on Q at So that displaces it, P held
+/// [ t ] = [ K_trᵀ  K_rr ] [ φ ]       d (m), φ (rad): displacement of So and rotation of Q
+/// ```
+/// All in S axes, which are those of P: about another point the blocks are others. `K_tr` is not
+/// zero where the link bends under a force at So. Linear in d and φ: a link that turns by tenths of
+/// a radian needs more parts.
+///
+/// [`substitute`] does not check `K_S`: [`flexarm_fem::stiffness_at_split`] refuses what is not
+/// symmetric and positive definite, and so do the steppers.
 #[derive(Clone, Debug)]
 pub struct ElasticJoint {
     /// Name of the flexible link.
@@ -246,7 +257,7 @@ pub fn distal_joint<'m>(
 /// Joints of a lumped link beyond the plane through S normal to A-B, and always the distal joint,
 /// move to the distal part `<link>__distal`. Joints of a modal link move to the nearest interface.
 /// At zero elastic coordinates all frames are unchanged, and the actuated coordinates keep their
-/// order.
+/// order. Stiffnesses are not checked, see [`ElasticJoint`].
 ///
 /// # Errors
 /// [`SubstitutionError`] with the name of the link.

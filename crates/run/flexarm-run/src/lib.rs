@@ -1,18 +1,19 @@
 //! From a robot file to a robot, an arm and a run.
 //!
-//! ```no_run
+//! ```
 //! use flexarm_run::{Modelling, Motion, Robot, RunOptions};
 //!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
 //! let robot = Robot::load("robots/kr210")?;
-//! let motion = Motion::load("trajectories/pick_and_place.toml", &robot)?;
+//! let motion = Motion::load("trajectories/point_to_point.toml", &robot)?;
 //! let run = robot.model(&Modelling::default())?.simulate(&motion, &RunOptions::default())?;
 //! println!("{}", run.summary.headline);
-//! # Ok::<(), flexarm_run::Error>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! [`Robot::load`] reads, [`Robot::model`] models links and drives, [`Arm::simulate`] runs a
-//! [`Motion`] or a [`Scenario`]. [`statics()`], [`modes()`] and [`response()`] compute results at
-//! one pose, [`Arm::operating_point`] at many; [`mod@reduce`] converts a mesh to a flexible link.
+//! [`Motion`] or a [`Scenario`]. [`Arm::statics`], [`Arm::modes`] and [`Arm::response`] compute
+//! results at one pose, [`Arm::operating_point`] at many; [`mod@reduce`] converts a mesh to a flexible link.
 //! The study crates build on this crate; the crate `flexarm` re-exports all of them.
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 

@@ -3,6 +3,19 @@
 //!
 //! At each pose the arm is a linear structure about its equilibrium, in series with the tool's own
 //! modes (`place.rs`). The limits are those of [`milling`]. Start at [`lobes`].
+//!
+//! ```
+//! use flexarm_chatter::{CuttingPlace, CuttingTool, LobesRequest, lobes};
+//! use flexarm_run::Robot;
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let robot = Robot::load("robots/kr210")?;
+//! let tool = CuttingTool { rpm: vec![6000.0, 9000.0], ..CuttingTool::load("robots/tools/endmill_20mm.toml")? };
+//! let found = lobes(&robot, &tool, &CuttingPlace::At(None), &LobesRequest::default(), &|_, _| true)?;
+//! println!("stable up to {} m at {} rpm", found.best_depth_m, found.best_rpm);
+//! # assert!(found.best_depth_m >= found.stable_below_m.unwrap_or(0.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 
 mod caveats;

@@ -5,6 +5,19 @@
 //! the motion ([`Inversion`]), and repeats this a few times. With [`Method::Static`] each point is
 //! corrected to its static equilibrium only. [`static_targets`], [`Inversion`] and [`Shaper`] work
 //! on plain values.
+//!
+//! ```
+//! use flexarm_compensate::{CompensateRequest, Method, compensate_motion};
+//! use flexarm_run::{Motion, Robot};
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let robot = Robot::load("robots/kr210")?;
+//! let motion = Motion::load("trajectories/point_to_point.toml", &robot)?;
+//! let request = CompensateRequest { method: Method::Static, sweep: false, ..CompensateRequest::default() };
+//! let found = compensate_motion(&robot, motion, &request)?;
+//! assert!(found.after.rms_m < 0.5 * found.before.rms_m);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 

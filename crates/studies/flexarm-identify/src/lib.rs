@@ -3,6 +3,21 @@
 //! [`identify_robot`] reads a file of measurements (`docs/identify.md`), estimates the robot file's
 //! parameters and their uncertainty; [`plan_measurements`] chooses poses. The underlying functions
 //! on plain values are re-exported: [`identify`], [`plan`], [`MeasuredArm`].
+//!
+//! ```
+//! use flexarm_identify::{frequency_slopes, nominal, parameters};
+//! use flexarm_run::{Modelling, Robot};
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let arm = Robot::load("robots/kr210")?.model(&Modelling::default())?;
+//! let unknown = &parameters(&arm)[..2];
+//! let found = frequency_slopes(&nominal(&arm), unknown, &[0.0; 6])?;
+//! println!("first frequency {} Hz", found.hz[0]);
+//! for (parameter, slope) in unknown.iter().zip(found.slopes.row(0).iter()) {
+//!     println!("{}: {slope} Hz per unit of its search coordinate", parameter.name);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
 
 mod answer;

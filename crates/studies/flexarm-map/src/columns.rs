@@ -123,12 +123,12 @@ impl Layout {
             columns.push(MapColumn { more_is_better: true, ..less("depth_m", &meaning) });
         }
         let whole = if loaded { "error" } else { "sag" };
-        for element in &arm.elements {
+        for element in &plant.elements {
             let meaning = format!("share of the element in the {whole}, along the {whole}, first order");
             columns.push(MapColumn { quantity: true, ..place(&format!("share_{}", element.name), &meaning) });
         }
         let range = |first: usize, size: usize| first..first + size;
-        let elements = arm.elements.iter().map(|element| range(arm.offset(element), element.size)).collect();
+        let elements = plant.elements.iter().map(|element| range(plant.offset(element), element.size)).collect();
         Self { columns, joints: joints.len(), frequencies, loaded, cuts: tool.is_some(), matrix, elements }
     }
 

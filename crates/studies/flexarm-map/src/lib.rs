@@ -3,12 +3,13 @@
 //! [`map()`] evaluates TCP positions, joint positions or a motion ([`MapRegion`]) and returns a
 //! [`Map`]: figures, the best and the worst pose, and every pose as a row of a [`MapTable`].
 //!
-//! ```no_run
+//! ```
 //! use flexarm_run::Robot;
 //! use flexarm_map::{JointRange, MapRegion, MapRequest, map};
 //!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
 //! let robot = Robot::load("robots/kr210")?;
-//! let joint = |joint: &str, range| JointRange { joint: joint.into(), range, points: 50 };
+//! let joint = |joint: &str, range| JointRange { joint: joint.into(), range, points: 5 };
 //! let region = MapRegion::Joints(vec![joint("joint_2", [-1.8, 0.0]), joint("joint_3", [0.0, 2.0])]);
 //! let found = map(&robot, &MapRequest { region, ..MapRequest::default() }, &mut |_, _| std::ops::ControlFlow::Continue(()))?;
 //! println!("softest with the joints at {:?}", found.worst.q);
@@ -41,9 +42,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
-use flexarm_kinematics::{Data, Model, forward_kinematics};
-use flexarm_settings::Quantity;
-use nalgebra::DVector;
+use flexarm_kinematics::Model;
 use serde::Serialize;
 
 pub use columns::MapColumn;
@@ -74,8 +73,7 @@ use flexarm_run::caveat::motion::of_wrench;
 use flexarm_run::caveat::size::Size;
 use flexarm_run::inspect::joint_values;
 use flexarm_run::posed::check_wrench;
-use flexarm_run::robot::tcp_frame;
-use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, Scenario, ValueError, caveat};
+use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, Scenario, caveat};
 
 /// Poses kept at each place, among all tool directions and branches of the inverse kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

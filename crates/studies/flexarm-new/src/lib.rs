@@ -1,14 +1,17 @@
 //! A robot file from a robot description: facts are taken from it, and what is missing is assumed
 //! and reported, or asked for.
 //!
-//! ```no_run
+//! ```
 //! use flexarm_new::{NewOptions, new_robot};
 //!
-//! let made = new_robot("ur10.urdf".as_ref(), "my_robot".as_ref(), false, &NewOptions::default())?;
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let folder = std::env::temp_dir().join(format!("new_robot_{}", std::process::id()));
+//! let made = new_robot("robots/kr210/kr210.urdf".as_ref(), &folder, false, &NewOptions::default())?;
 //! for assumption in &made.assumptions {
 //!     println!("{}: {}", assumption.about, assumption.text);
 //! }
-//! # Ok::<(), flexarm_run::Error>(())
+//! # std::fs::remove_dir_all(folder)?;
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Start at [`new_robot`]. `docs/new_robot.md` has the rules and a complete example. Not here:

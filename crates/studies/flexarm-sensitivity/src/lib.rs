@@ -3,6 +3,20 @@
 //!
 //! Start at [`sensitivity`], or at [`error_slopes`] for numbers only; [`pose_sensitivity`] is the
 //! analysis at a pose.
+//!
+//! ```
+//! use flexarm_run::{Modelling, Robot};
+//! use flexarm_sensitivity::pose_sensitivity;
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let robot = Robot::load("robots/kr210")?;
+//! let found = pose_sensitivity(&robot, Modelling::default(), None, &["link.*.stiffness_factor".into()])?;
+//! for own in &found.parameters {
+//!     println!("{} per {}: the TCP rises by {} m", own.name, own.per, own.tcp_m[2]);
+//! }
+//! # assert!(!found.parameters.is_empty());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a failed unwrap fails the test"))]
 

@@ -5,6 +5,24 @@
 //! [`Sweep::run`] computes the missing runs in a folder or in a shard of it, [`merge`] joins
 //! folders of shards. Runs are numbered from 0; the number alone determines a run, on any machine.
 //!
+//! ```
+//! use flexarm_sweep::{Finders, Sweep};
+//!
+//! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
+//! let root = std::env::current_dir()?;
+//! let [robot, motion] = ["robots/kr210/robot.toml", "trajectories/point_to_point.toml"].map(|file| root.join(file));
+//! let study = format!(
+//!     "format = 1\nrobot = {robot:?}\nmotion = {motion:?}\n\
+//!      [[parameter]]\npath = \"payload.mass\"\nvalues = [30.0, 75.5, 150.0]\n"
+//! );
+//! let path = std::env::temp_dir().join(format!("study_{}.toml", std::process::id()));
+//! std::fs::write(&path, study)?;
+//! let sweep = Sweep::load(&path, &Finders::default());
+//! # std::fs::remove_file(path)?;
+//! assert_eq!(sweep?.runs(), 3);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! Not here: the mathematics of designs and their evaluation ([`statistics`]); comparison of a few
 //! runs by their curves ([`flexarm_run::compare_study`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]

@@ -164,7 +164,10 @@ impl AnalyticArm {
     /// * `q_held`: values of all coordinates, nv long (rad or m); those of the six are ignored.
     ///
     /// # Errors
-    /// [`NoAnalyticIk`] with the missing geometric property.
+    /// [`NoAnalyticIk`] with the missing geometric property, or for a `q_held` of another length.
+    ///
+    /// # Panics
+    /// If a joint is not a coordinate of the model.
     pub fn with_joints(
         model: &Model,
         frame: &Frame,

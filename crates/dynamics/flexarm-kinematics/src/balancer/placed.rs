@@ -76,6 +76,9 @@ impl BalancerLine {
 
 impl PlacedBalancer {
     /// Line at these body poses; `None` for a balancer about a joint.
+    ///
+    /// # Panics
+    /// If `X_WB` is shorter than the number of bodies.
     pub fn line(&self, X_WB: &[Pose]) -> Option<BalancerLine> {
         match &self.place {
             BalancerPlace::Points(ends) => Some(BalancerLine::new(&self.law, ends, X_WB)),
@@ -84,6 +87,9 @@ impl PlacedBalancer {
     }
 
     /// Length of the line (m) or value of the joint (rad or m) at these poses and coordinates.
+    ///
+    /// # Panics
+    /// If `X_WB` is shorter than the number of bodies, or `q` than nv.
     pub fn length(&self, X_WB: &[Pose], q: &[f64]) -> f64 {
         match &self.place {
             BalancerPlace::Points(ends) => BalancerLine::new(&self.law, ends, X_WB).length,
@@ -93,6 +99,9 @@ impl PlacedBalancer {
 
     /// Wrenches on the two bodies about their origins, in world axes, at length or joint value `x`.
     /// About a joint with a six-DoF spring, they are exact to first order in its deflection.
+    ///
+    /// # Panics
+    /// If `X_WB` is shorter than the number of bodies.
     pub fn wrenches(&self, X_WB: &[Pose], x: f64) -> [(usize, Wrench); 2] {
         let at_origin = |body: usize, p_W: &Vector3<f64>, F: Vector3<f64>| {
             let arm = p_W - X_WB[body].translation.vector;

@@ -127,6 +127,9 @@ impl Model {
     }
 
     /// Whether a body is in the subtree of another one, or is that body.
+    ///
+    /// # Panics
+    /// If there is no body `of`.
     pub fn is_in_subtree(&self, body: usize, of: usize) -> bool {
         (of..self.bodies[of].subtree_end).contains(&body)
     }
@@ -159,7 +162,10 @@ impl Model {
     }
 
     /// Returns a copy of the model with the inertia of one body replaced. `inertia` is about Bo in
-    /// B axes and includes everything fixed to the body.
+    /// B axes and includes everything fixed to the body. It is not checked.
+    ///
+    /// # Panics
+    /// If there is no such body.
     pub fn with_inertia(&self, body: usize, inertia: SpatialInertia) -> Self {
         let mut model = self.clone();
         model.bodies[body].inertia = inertia;
@@ -167,6 +173,9 @@ impl Model {
     }
 
     /// Sets the pose of the joint frame of a body in its parent body, at zero coordinate.
+    ///
+    /// # Panics
+    /// If there is no such body.
     pub fn set_joint_frame(&mut self, body: usize, X_PJ: Pose) {
         let body = &mut self.bodies[body];
         body.is_parallel = X_PJ.rotation == Rotation3::identity();

@@ -141,7 +141,7 @@ impl Table<'_> {
             false => format!("{kind}, {}{decimals}", self.separator.in_words()),
         };
         let trajectory = layout.notes.into_iter().fold(trajectory, Trajectory::with_note);
-        let trajectory = trajectory.with_told_units(layout.stated);
+        let trajectory = trajectory.with_stated_units(layout.stated);
         Ok((trajectory, TableInfo { format, rows: rows.times.len() }))
     }
 }

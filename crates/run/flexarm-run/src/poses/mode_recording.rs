@@ -1,6 +1,8 @@
 //! Modes as a recording: each mode oscillates for a few seconds, one after another, slowly and with
 //! a visible amplitude.
 
+use std::sync::Arc;
+
 use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
 use flexarm_log::{Caption, ElasticSample, RunHeader, RunResult, Sample, TwinSample};

@@ -16,7 +16,6 @@ use crate::arm::options::Modelling;
 use crate::caveat::{self, Caveat, kinds};
 use crate::error::{Error, PoseError};
 use crate::poses::posed::{Posed, step_error};
-use crate::robot::Robot;
 use crate::run::summary::Files;
 
 /// Result of `flexarm modes`. SI units; world axes, at the TCP; six-vectors linear first.
@@ -141,7 +140,7 @@ impl Arm {
     /// Returns the lowest `count` modes at a pose, about the static equilibrium, with the drives
     /// locked.
     ///
-    /// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default.
+    /// * `at`: values of all actuated joints (rad or m), [`crate::Robot::start_pose`] by default.
     /// * `speeds`: speeds of all actuated joints (rad/s or m/s). With them the modes are those about
     ///   the equilibrium of the turning arm, with stiffening by centrifugal loads and Coriolis forces,
     ///   the motors following their motion exactly.

@@ -19,7 +19,6 @@ use crate::caveat::{self, Caveat, kinds};
 use crate::error::{ChannelError, Error, ValueError};
 use crate::poses::modes::{linear_error, modes_of, tool_map};
 use crate::poses::posed::Posed;
-use crate::robot::Robot;
 
 /// Files of a response in its output folder: table, plot, figures.
 const RESPONSE_FILES: [&str; 3] = ["response.csv", "response.svg", "response.json"];
@@ -168,7 +167,7 @@ impl Arm {
     /// Returns the frequency response at a pose, linearised about the static equilibrium under
     /// gravity, with the other drives locked.
     ///
-    /// `at`: values of all actuated joints (rad or m); [`Robot::start_pose`] by default.
+    /// `at`: values of all actuated joints (rad or m); [`crate::Robot::start_pose`] by default.
     ///
     /// # Errors
     /// [`Error::Channel`] and [`Error::Value`] for invalid channel names and values, [`Error::Step`]

@@ -15,7 +15,6 @@ use crate::caveat::{self, Caveat, validity};
 use crate::error::Error;
 use crate::poses::posed::{Posed, all_finite};
 use crate::poses::statics_picture::{self, StaticsFiles, StaticsOutputs};
-use crate::robot::Robot;
 use crate::run::monitor::stress::stress_at_rest;
 use crate::run::summary::LinkStressFigures;
 
@@ -87,7 +86,7 @@ impl Arm {
     /// Returns the equilibrium at a pose under gravity and a wrench at the TCP, with the drives
     /// locked.
     ///
-    /// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`] by default.
+    /// * `at`: values of all actuated joints (rad or m), [`crate::Robot::start_pose`] by default.
     /// * `wrench`: force and moment at the TCP in world axes (N, N m), not rotating with the
     ///   deflection.
     ///

@@ -2,8 +2,7 @@
 //! effects of a robot.
 
 use flexarm_stepping::{
-    CurveError, GearCoupling, Harmonic, Hysteresis, LoadFriction, Plant, Slider, StepError, TorqueCurve,
-    TransmissionError,
+    CurveError, GearCoupling, Harmonic, Hysteresis, LoadFriction, Plant, StepError, TorqueCurve, TransmissionError,
 };
 use nalgebra::DMatrix;
 use serde::Deserialize;

@@ -37,7 +37,7 @@ impl RunLoop<'_> {
                 add(since, EventKind::Limit, text);
             }
         }
-        let mut jumps: Vec<f64> = self.arm.load_jumps().collect();
+        let mut jumps: Vec<f64> = self.plant.load_jumps().collect();
         jumps.sort_by(f64::total_cmp);
         jumps.dedup();
         // Tables and milling loads have a kink at every row; a list of those is of no use.
@@ -45,7 +45,7 @@ impl RunLoop<'_> {
         for t in jumps.iter().take(if jumps.len() <= MAX_JUMPS { MAX_JUMPS } else { 1 }) {
             add(*t, EventKind::Load, "an external load changes".into());
         }
-        for change in &self.arm.inertia_changes {
+        for change in &self.plant.inertia_changes {
             add(change.t, EventKind::Load, "the payload changes".into());
         }
         let reached = self.monitors.tool.result().last_time_s().unwrap_or(0.0);

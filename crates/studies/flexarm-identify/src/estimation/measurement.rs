@@ -136,7 +136,7 @@ impl<'a> Workspaces<'a> {
         }
         let (mut forces, mut twists) = slopes_at_rest(at, parameters, &own);
         let R_WT = at.tcp_pose().rotation;
-        let J = at.jacobian().columns_range(at.arm().model.n_actuated()..).into_owned();
+        let J = at.jacobian().columns_range(at.plant().model.n_actuated()..).into_owned();
         for (k, [v, w]) in tool_twists(all, &R_WT, &turn) {
             // The applied force moves with the tool, which changes its moment.
             let moment = (v + w.cross(&(R_WT * load.at))).cross(&load.wrench.force);
