@@ -251,6 +251,11 @@ fn inertia_of_loads_and_relative_deviations_of_frequencies_count() {
     refused("load = { mass = 50, inertia = [20, 1, 1, 0, 0, 0] }", "std = 0.1", "which are not physical");
     refused("load = { inertia = [1, 1, 1, 0, 0, 0] }", "std = 0.1", "no mass");
     refused("", "std = 0.1\nstd_relative = 0.01", "keep one of them");
+    // The frequencies of the arm itself in rad/s.
+    let own = expected("");
+    let radians = own.iter().map(|(hz, _)| (std::f64::consts::TAU * hz).to_string()).collect::<Vec<_>>().join(", ");
+    let error = place.identify(&job("", "").replace("8.0, 10.0", &radians)).unwrap_err().to_string();
+    assert!(error.contains("divide numbers in rad/s by 2 pi"), "{error}");
 }
 
 /// Truth: the synthetic position of the target. It is declared with an error of 1 mm and a

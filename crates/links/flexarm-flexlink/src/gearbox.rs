@@ -12,7 +12,7 @@
 //!
 //! A seat deflects before the joint, so that its two springs do not turn with it:
 //! ```text
-//! parent --spring x--> --spring y--> <joint>__seated --joint--> <joint>__motor --spring--> child
+//! parent --spring--> --spring--> <joint>__seated --joint--> <joint>__motor --spring--> child
 //! ```
 //!
 //! The guide of a telescopic joint tilts in the middle of the overlap of its tubes, which moves
@@ -84,7 +84,8 @@ pub struct Gearbox {
     pub joint: String,
     /// Stiffness of the spring.
     pub stiffness: GearStiffness,
-    /// Stiffness of the housing about x and y of the joint frame, before the joint (N m/rad).
+    /// Stiffness of the housing before the joint (N m/rad), about the two axes of the joint frame that
+    /// are across the joint's axis: x and y if it is z.
     pub seat: Option<[f64; 2]>,
 }
 
@@ -219,8 +220,8 @@ fn there_and_back(
     (middle, tilted)
 }
 
-/// Suffixes of the names of the springs of a seat.
-pub const SEAT: [&str; 2] = [".seat_x", ".seat_y"];
+/// Suffixes of the names of the springs of a seat, by axis of the joint frame.
+pub const SEAT: [&str; 3] = [".seat_x", ".seat_y", ".seat_z"];
 /// `GearSpring::component` of the first spring of a seat.
 const SEATED: usize = 6;
 
@@ -264,9 +265,12 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             let seated = format!("{name}__seated");
             let parent = std::mem::replace(&mut joint.parent, seated.clone());
             let X = std::mem::replace(&mut joint.X_PJ, Pose::identity());
-            let axes = SEAT.into_iter().zip([Vector3::x_axis(), Vector3::y_axis()]).zip(k);
-            let turn = |((suffix, axis), k)| (suffix, JointKind::ElasticRevolute(axis), DMatrix::from_element(1, 1, k));
-            (axes.map(turn).collect(), (parent, seated), X)
+            let axes = [Vector3::x_axis(), Vector3::y_axis(), Vector3::z_axis()];
+            let own = joint.kind.axis_motion().map_or(2, |motion| motion.axis().iamax());
+            let across = SEAT.into_iter().zip(axes).enumerate().filter(|(k, _)| *k != own).zip(k);
+            let turn =
+                |((_, (suffix, axis)), k)| (suffix, JointKind::ElasticRevolute(axis), DMatrix::from_element(1, 1, k));
+            (across.map(turn).collect(), (parent, seated), X)
         });
         if let Some((parts, ends, X)) = seat {
             mechanism.links.push(Link { name: ends.1.clone(), inertia: None });

@@ -209,7 +209,8 @@ fn a_seat_yields_about_axes_that_do_not_turn_with_the_joint() {
         let JointKind::Revolute(axis) = robot().joint("elbow").expect("there").kind else { panic!("turns") };
         let before = X_WJ.rotation * Rotation3::from_axis_angle(&axis, -turned);
         let lever = X_WT.translation.vector - X_WJ.translation.vector;
-        let own = [(Vector3::x(), seat[0]), (Vector3::y(), seat[1]), (*axis, k)];
+        let across: Vec<usize> = (0..3).filter(|a| *a != axis.iamax()).collect();
+        let own = [(Vector3::ith(across[0], 1.0), seat[0]), (Vector3::ith(across[1], 1.0), seat[1]), (*axis, k)];
         let truth: Matrix6<f64> = own.into_iter().fold(Matrix6::zeros(), |sum, (axis, k)| {
             let axis = before * axis;
             let mut u = nalgebra::Vector6::zeros();

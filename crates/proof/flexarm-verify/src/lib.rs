@@ -23,6 +23,7 @@
 
 pub mod bench;
 mod benchmarks;
+mod calibrated_arm;
 pub mod check;
 mod compliance;
 mod error;
@@ -48,7 +49,7 @@ pub use files::{PAGE, VerificationFiles, differences_from};
 type Entry = (&'static str, f64, fn(&Bench, &mut Pace<'_>) -> Result<Case, Error>);
 
 /// The cases, in the order of the page.
-const CASES: [Entry; 8] = [
+const CASES: [Entry; 9] = [
     ("one-beam", 1.0, one_beam::case),
     ("three-beams", 5.0, three_beams::case),
     ("lower-arm", 5.0, lower_arm::case),
@@ -57,6 +58,7 @@ const CASES: [Entry; 8] = [
     ("measured", 3.0, measured::case),
     ("benchmarks", 8.0, benchmarks::case),
     ("measured-arm", 0.1, measured_arm::case),
+    ("calibrated-arm", 0.5, calibrated_arm::case),
 ];
 
 /// Names of the cases.

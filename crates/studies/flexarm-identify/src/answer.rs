@@ -42,7 +42,8 @@ pub struct Identification {
     pub residual: Residual,
     /// RMS of cross-validation residuals; null with fewer than two readings.
     pub held_out: Option<HeldOutFigures>,
-    /// Ratio of the scatter to the declared one if chance does not explain it; otherwise null.
+    /// Ratio of the scatter to the declared one, above or below 1, if chance does not explain it;
+    /// otherwise null.
     pub misfit: Option<f64>,
     /// Whether the deviations of all readings were given; the others are estimated from the scatter.
     pub deviations_known: bool,

@@ -43,17 +43,20 @@ const FRAME_RATIO: f64 = 0.05;
 pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     let mut caveats = Vec::new();
     if let Some(factor) = found.misfit {
-        let text = format!(
-            "the residuals are {factor:.1} times as large as the standard deviations of the readings: the model lacks \
-             a flexible part, loads or frames are wrong, or the standard deviations are too small; the standard \
-             deviations of the results include this error of the model"
-        );
-        caveats.push(Caveat::from_message(
-            "misfit",
-            "measurements",
-            text,
-            "fit more parameters, and check the largest residuals",
-        ));
+        let (cause, remedy) = match factor > 1.0 {
+            true => (
+                "the model lacks a flexible part, loads or frames are wrong, or the standard deviations are too small; \
+                 the standard deviations of the results include this error of the model",
+                "fit more parameters, and check the largest residuals",
+            ),
+            false => (
+                "these are too large; the standard deviations of the results are those of the residuals",
+                "give smaller standard deviations, or none",
+            ),
+        };
+        let text =
+            format!("the residuals are {factor:.2} times as large as the standard deviations of the readings: {cause}");
+        caveats.push(Caveat::from_message("misfit", "measurements", text, remedy));
     }
     let unsure = |p: &&ParameterEstimate| !p.identifiable && !p.rigid;
     let unsure: Vec<&str> = found.parameters.iter().filter(unsure).map(|p| p.name.as_str()).collect();

@@ -236,8 +236,7 @@ impl Targets {
 #[doc(hidden)]
 pub mod internals {
     pub use crate::estimation::bounded::bounded_minimum;
-    pub use crate::estimation::identify::chi_square_bound;
-    pub use crate::estimation::least_squares::scale;
+    pub use crate::estimation::least_squares::{chi_square_bounds, scale};
     pub use crate::estimation::parameter::displacement;
     pub use crate::estimation::placement::rigid_fit;
     pub use crate::parameters::ParameterLocation;

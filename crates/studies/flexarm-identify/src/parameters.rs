@@ -5,7 +5,7 @@
 //! | --- | --- |
 //! | `drive.JOINT.gearbox.stiffness` | single stiffness of a gearbox (N m/rad; N/m if it slides) |
 //! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six stiffnesses, from 0 |
-//! | `drive.JOINT.gearbox.seat[k]` | stiffness of the housing about x or y, before the joint |
+//! | `drive.JOINT.gearbox.seat[k]` | stiffness of the housing across the axis, before the joint |
 //! | `link.LINK.stiffness_factor` | factor on the whole stiffness of a flexible link |
 //! | `link.LINK.stiffness_factors[k]` | factor on one of six directions of a lumped link, from 0 |
 //! | `link.LINK.stiffness[i][j]` | entry of a two-part link's symmetric 6x6 (N/m, N, N m/rad) |
@@ -206,8 +206,8 @@ fn frame_parameters(arm: &Arm) -> Vec<Candidate> {
     for (body, own) in bodies.filter(|(_, own)| of_robot.contains(&own.joint.as_str())) {
         let JointMotion::Axis(motion) = own.motion else { continue };
         // The frame of a joint with a seat is that of the seat.
-        let seat = format!("{}__spring{}", own.joint, SEAT[0]);
-        let body = arm.model.bodies().iter().position(|body| body.joint == seat).unwrap_or(body);
+        let seat = SEAT.map(|suffix| format!("{}__spring{suffix}", own.joint));
+        let body = arm.model.bodies().iter().position(|body| seat.contains(&body.joint)).unwrap_or(body);
         let (joint, axis) = (&own.joint, Vector6::from_row_slice(motion.column().as_slice()));
         let mut add = |key: &str, unit: &str, twist: Vector6<f64>, zero: bool| {
             let effect = Effect::Frame { body, twist, size: if zero { ZERO_SIZE } else { FRAME_SIZE } };

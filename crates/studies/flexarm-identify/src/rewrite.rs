@@ -65,11 +65,12 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
     let number = exact(found.value);
     match written {
         ParameterLocation::Gearbox { joint, entry } => {
-            let drive = named(file, "drive", "joint", joint)?;
-            let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
-            let stiffness = gearbox.and_then(|gearbox| gearbox.get_mut("stiffness"));
             let missing = || RewriteError::NoGearbox { joint: joint.clone(), key: "stiffness" };
-            put_stiffness(stiffness.ok_or_else(missing)?, *entry, found)
+            let drive = named(file, "drive", "joint", joint)?;
+            let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut).ok_or_else(missing)?;
+            put_stiffness(gearbox.get_mut("stiffness").ok_or_else(missing)?, *entry, found)?;
+            gearbox.insert("identified", toml_edit::value(true));
+            Ok(())
         }
         ParameterLocation::Seat { joint, entry } => {
             let gearbox = named(file, "drive", "joint", joint)?.get_mut("gearbox").and_then(Item::as_table_like_mut);

@@ -159,3 +159,26 @@ fn one_wild_residual_in_forty_does_not_carry_huber_and_cauchy_away() {
     let (square, huber, cauchy) = (error(Loss::Square), error(Loss::Huber(2.5)), error(Loss::Cauchy(2.0)));
     assert!(square > 0.5 && huber < 0.1 * square && cauchy < 1e-3, "{square} {huber} {cauchy:e}");
 }
+
+/// `r = (x, c + a x² / 2)`: at its minimum 0 the cost has the curvature `1 + a c`, of which steps
+/// without damping see 1: they pass the minimum and keep the fraction `a c` of the distance.
+struct Curved;
+
+impl Residuals for Curved {
+    type Error = ();
+    fn evaluate(&self, x: &DVector<f64>, J: Option<&mut DMatrix<f64>>) -> Result<DVector<f64>, ()> {
+        if let Some(J) = J {
+            *J = DMatrix::from_column_slice(2, 1, &[1.0, 0.97 * x[0]]);
+        }
+        Ok(DVector::from_column_slice(&[x[0], 1.0 + 0.97 * x[0] * x[0] / 2.0]))
+    }
+}
+
+#[test]
+fn a_fit_whose_residuals_curve_settles_instead_of_passing_the_minimum_again_and_again() {
+    let noise = [Noise { std: 1.0, kind: None, size: 1.0, along: 0 }; 2];
+    let start = [Unknown { start: 0.1, ..Unknown::free() }];
+    let found = solve(&Curved, &noise, &start, &Search { loss: Loss::Square, ..Search::default() }, &|_| true).unwrap();
+    let error = found.unknowns[0].abs();
+    assert!(found.converged && found.iterations < 30 && error < 1e-4, "{error:e} after {}", found.iterations);
+}

@@ -31,7 +31,7 @@ fn numbers_are_changed_in_their_places_and_nothing_else_is() {
     let new = rewritten(text, &all, ("tool", &Pose::identity()), &[], here, here).unwrap();
     let (comments, body) = new.split_once("\n\n").unwrap();
     assert!(comments.contains("a = 1234570 +- 2000 N m/rad, was 1000000"), "{comments}");
-    let expected = text.replace("1.0e6", "1234567.0").replace("[1.0, 2.0, 3.0]", "[1.0, 2.51234, 3.0]").replace(
+    let expected = text.replace("1.0e6", "1234567.0").replace("3.0 }", "3.0 , identified = true }").replace("[1.0, 2.0, 3.0] # three\n", "[1.0, 2.51234, 3.0] # three\nidentified = true\n").replace(
         "link = \"arm\" # bends\n",
         "link = \"arm\" # bends\nstiffness_factor = 0.87654321\nstiffness_factors = [1.0, 1.0, 1.0, 1.0, 1.2345, 1.0]\n",
     );

@@ -137,13 +137,14 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
     let sound = RIGID[0]..=unusual;
     let factors: Vec<slip::Factor> = slip::TURNING.iter().map(|(f, words)| (1.0 / f, *words)).collect();
     let likely = || slip(turned, &sound, &factors, 1.0);
-    if effort.is_finite() && turned > unusual {
+    let questioned = effort.is_finite() && !gear.identified;
+    if questioned && turned > unusual {
         let wrong = if others.is_some_and(|others| turned > MAX_ROTATION_RATIO * others) { unusual } else { wrong };
         let hinted = turned > wrong || (effort > STRONG && turned > HINTED * unusual);
         let caveat = kinds::GEAR_SOFT.found(name(drive), turned, unusual);
         let caveat = if hinted { caveat.likely(likely()) } else { caveat };
         caveats.push(if turned > wrong { caveat } else { caveat.as_note() });
-    } else if effort.is_finite() && turned < RIGID[0] {
+    } else if questioned && turned < RIGID[0] {
         let caveat = kinds::GEAR_STIFF.found(name(drive), turned, RIGID[0]).likely(likely());
         caveats.push(if turned < RIGID[1] { caveat } else { caveat.as_note() });
     }

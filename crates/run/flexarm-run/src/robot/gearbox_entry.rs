@@ -43,10 +43,13 @@ pub(crate) struct GearboxEntry {
     pub transmission_error: Vec<HarmonicEntry>,
     /// Internal friction, in catalogue terms.
     pub hysteresis: Option<HysteresisEntry>,
-    /// Stiffness of the housing about x and y of the joint frame, before the joint's angle (N m/rad).
+    /// Stiffness of the housing across the joint's axis, before its angle (N m/rad).
     pub seat: Option<Spanned<[f64; 2]>>,
     /// Tubes of a telescopic joint, instead of a stiffness.
     pub guide: Option<GuideEntry>,
+    /// Whether the stiffness was identified from measurements, so that no caveat questions it.
+    #[serde(default)]
+    pub identified: bool,
 }
 
 impl GearboxEntry {
@@ -72,6 +75,8 @@ pub struct GearDamping {
     pub hysteresis: Option<GearHysteresis>,
     /// Tilts of a telescopic guide, one per spring; empty for other gearboxes.
     pub tilts: Vec<GuideTilt>,
+    /// Whether the stiffness was identified from measurements.
+    pub identified: bool,
 }
 
 impl GearDamping {
@@ -125,7 +130,8 @@ pub(crate) fn gear(
     let curve = curves.first().and_then(Option::as_ref);
     let law = gear.hysteresis.as_ref().map(|entry| hysteresis(entry, about, curve));
     let hysteresis = law.transpose().map_err(|error| at(error.to_string()))?;
-    let damping = GearDamping { dampers, curves, play, transmission, hysteresis, tilts: Vec::new() };
+    let identified = gear.identified;
+    let damping = GearDamping { dampers, curves, play, transmission, hysteresis, tilts: Vec::new(), identified };
     let seat = gear.seat.as_ref().map(|seat| seat_of(joint, seat.get_ref(), size, gear));
     let seat = seat.transpose().map_err(|text| at(text.into()))?;
     Ok((Gearbox { joint: joint.name.clone(), stiffness, seat }, damping))
@@ -284,6 +290,7 @@ fn guide_gear(
             transmission: Vec::new(),
             hysteresis: None,
             tilts,
+            identified: gear.identified,
         },
     ))
 }

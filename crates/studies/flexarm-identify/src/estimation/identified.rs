@@ -74,8 +74,8 @@ pub struct Identified {
     pub normalised: Vec<f64>,
     /// Indices into [`Self::normalised`] with a magnitude above four, largest first.
     pub suspicious: Vec<usize>,
-    /// Ratio of the scatter to the declared one, if chance exceeds it less than once in a thousand
-    /// cases.
+    /// Ratio of the scatter to the declared one, above or below 1, if chance gives it less than once
+    /// in a thousand cases.
     pub misfit: Option<f64>,
     /// Errors of the model that the fit found.
     pub model_errors: Vec<ModelError>,

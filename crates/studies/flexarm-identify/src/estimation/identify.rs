@@ -8,7 +8,9 @@
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
-use crate::estimation::least_squares::{Progress, Residuals, Search, Solution, SolveError, Unknown, scale, solve};
+use crate::estimation::least_squares::{
+    Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, misfit, solve,
+};
 use crate::estimation::measurement::{MeasuredArm, NoAnswer};
 use crate::estimation::parameter::{NominalArm, Parameter};
 use crate::estimation::placement::placed;
@@ -16,9 +18,6 @@ use crate::estimation::reading::{Instrument, KINDS, Measurements, ReadingKind};
 
 /// Magnitude of a normalised residual above which its reading is suspicious.
 const SUSPICIOUS: f64 = 4.0;
-/// One-sided normal quantile for a probability of one in a thousand, above which the scatter counts
-/// as larger than declared.
-const MISFIT_QUANTILE: f64 = 3.09;
 /// Maximum number of further starts of a search that may end in a local minimum.
 const STARTS: usize = 12;
 /// Maximum ratio of posterior to prior deviation of a parameter that the readings determine.
@@ -173,7 +172,7 @@ impl Fit<'_> {
         };
         let mut best = from(&|_, _| 0.0);
         for number in 0..STARTS {
-            if best.as_ref().is_ok_and(|best| self.misfit(best).is_none() && self.is_known()) {
+            if best.as_ref().is_ok_and(|best| self.misfit(best).is_none_or(|factor| factor < 1.0) && self.is_known()) {
                 break;
             }
             let other = from(&|k, parameter| spread(number, k) * parameter.reference());
@@ -198,19 +197,14 @@ impl Fit<'_> {
         self.measurements.noise().iter().all(|noise| noise.std > 0.0)
     }
 
-    /// Returns the ratio of the scatter to the given deviations if it is larger than chance
-    /// explains in some kind of readings.
+    /// Returns the ratio of the scatter to the given deviations if it is larger or smaller than
+    /// chance explains in some kind of readings; the largest.
     fn misfit(&self, found: &Solution) -> Option<f64> {
         let noise = self.measurements.noise();
         let of = |kind: usize| {
-            let own: Vec<usize> = (0..noise.len()).filter(|k| noise[*k].kind == Some(kind)).collect();
-            if own.is_empty() || own.iter().any(|k| noise[*k].std == 0.0) {
-                return None;
-            }
-            let over: Vec<f64> = own.iter().map(|k| found.residuals[*k] / noise[*k].std).collect();
-            let freedom: f64 = own.iter().map(|k| 1.0 - found.leverages[*k]).sum();
-            let factor = scale(&over, freedom, self.search.loss);
-            (freedom >= 0.5 && factor * factor > chi_square_bound(freedom)).then_some(factor)
+            let own = || (0..noise.len()).filter(|k| noise[*k].kind == Some(kind));
+            let rows: Vec<(f64, Noise)> = own().map(|k| (found.residuals[k], noise[k])).collect();
+            misfit(&rows, own().map(|k| 1.0 - found.leverages[k]).sum(), self.search.loss)
         };
         (0..KINDS.len()).filter_map(of).reduce(f64::max)
     }
@@ -310,12 +304,6 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
         }
     }
     "the position of a target on the tool".to_owned()
-}
-
-/// Returns the upper 0.1 % quantile of χ² over its degrees of freedom (Wilson and Hilferty).
-pub fn chi_square_bound(freedom: f64) -> f64 {
-    let nine = 2.0 / (9.0 * freedom);
-    (1.0 - nine + MISFIT_QUANTILE * nine.sqrt()).powi(3)
 }
 
 /// Returns the estimate of a parameter.

@@ -2,12 +2,13 @@
 //! fit.
 //!
 //! ```text
-//! minimise Σ ρ(r_i / s_i) + Σ ((x_k - μ_k) / σ_k)²,   x_k >= b_k,   s_i² = std_i² + (τ_κ size_i)²
+//! minimise Σ ρ(r_i / s_i) + Σ ((x_k - μ_k) / σ_k)²,   x_k >= b_k,   s_i² = (φ_κ std_i)² + (τ_κ size_i)²
 //! ```
 //! τ_κ is the error of the model in residuals of kind κ: that at which they scatter as their `s_i`
 //! say, over the degrees of freedom that the fit leaves them (Huber's proposal 2, so that a few
-//! outliers do not count). The Levenberg-Marquardt method alternates with its estimation until both
-//! settle; the last iterations keep it. Not here: the measurements and the meaning of the unknowns.
+//! outliers do not count). φ_κ is 1, or below 1 if they scatter less than chance explains. The
+//! Levenberg-Marquardt method alternates with their estimation until both settle; the last
+//! iterations keep them. Not here: the measurements and the meaning of the unknowns.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -104,13 +105,14 @@ pub struct Search {
     pub loss: Loss,
     /// Maximum number of iterations.
     pub most_iterations: usize,
-    /// Maximum step of any unknown over its standard deviation at convergence.
+    /// Length of the last step in standard deviations, of any combination of the unknowns, at
+    /// convergence.
     pub tolerance: f64,
 }
 
 impl Default for Search {
     fn default() -> Self {
-        Self { loss: Loss::Huber(2.5), most_iterations: 100, tolerance: 1e-6 }
+        Self { loss: Loss::Huber(2.5), most_iterations: 100, tolerance: 1e-5 }
     }
 }
 
@@ -179,7 +181,7 @@ pub struct Progress {
     pub iteration: usize,
     /// Root mean square of the residuals over their present standard deviations.
     pub rms: f64,
-    /// Maximum step of an unknown over its standard deviation.
+    /// Length of the step in standard deviations of the unknowns, with their correlations.
     pub step: f64,
 }
 
@@ -193,6 +195,13 @@ const DEPENDENT: f64 = 1e-12;
 const SETTLED: (f64, f64) = (1e-2, 0.1);
 /// Minimum error of the model relative to the scatter at the start.
 const MIN_ERROR: f64 = 1e-8;
+/// Minimum part of given standard deviations that the scatter can reduce them to.
+const MIN_SHARE: f64 = 0.1;
+/// One-sided normal quantile for a probability of one in a thousand.
+const RARE_QUANTILE: f64 = 3.09;
+/// Ratio of the decrease of the cost to the expected one above which the damping decreases, and
+/// below which it increases.
+const GAIN: (f64, f64) = (0.75, 0.5);
 
 /// Solves the problem.
 ///
@@ -210,8 +219,16 @@ pub fn solve<P: Residuals>(
     let start = DVector::from_iterator(unknowns.len(), unknowns.iter().map(|u| u.start.max(u.lower)));
     let mut J = DMatrix::zeros(0, 0);
     let r = evaluated(problem, &start, &mut J)?;
-    let mut fit =
-        Fit { problem, noise, unknowns, search, s: DVector::zeros(r.len()), errors: Vec::new(), least: Vec::new() };
+    let mut fit = Fit {
+        problem,
+        noise,
+        unknowns,
+        search,
+        s: r.clone(),
+        errors: Vec::new(),
+        shares: Vec::new(),
+        least: Vec::new(),
+    };
     fit.first_errors(&r);
     let mut state = State { x: start, r, J, damping: 1e-4 };
     let (mut iterations, mut kept, mut converged) = (0, fit.errors.is_empty(), unknowns.is_empty());
@@ -262,6 +279,8 @@ struct Fit<'a, P> {
     /// Standard deviations with the present errors of the model.
     s: DVector<f64>,
     errors: Vec<f64>,
+    /// Parts of the given standard deviations that count.
+    shares: Vec<f64>,
     /// Minimum errors of the model.
     least: Vec<f64>,
 }
@@ -278,6 +297,7 @@ impl<P: Residuals> Fit<'_, P> {
             self.least.push(if needed { (MIN_ERROR * rms).max(f64::MIN_POSITIVE.sqrt()) } else { 0.0 });
             let error = scatter(&rows, rows.len() as f64, self.search.loss);
             self.errors.push(error.max(self.least[kind]));
+            self.shares.push(1.0);
         }
         self.set_deviations();
     }
@@ -288,8 +308,11 @@ impl<P: Residuals> Fit<'_, P> {
     }
 
     fn set_deviations(&mut self) {
-        let error = |noise: &Noise| noise.kind.map_or(0.0, |kind| self.errors[kind] * noise.size);
-        self.s = DVector::from_iterator(self.noise.len(), self.noise.iter().map(|own| own.std.hypot(error(own))));
+        let of = |noise: &Noise| match noise.kind {
+            Some(kind) => (self.shares[kind] * noise.std).hypot(self.errors[kind] * noise.size),
+            None => noise.std,
+        };
+        self.s = DVector::from_iterator(self.noise.len(), self.noise.iter().map(of));
     }
 
     /// Estimates the errors of the model anew; returns their largest relative change.
@@ -302,13 +325,15 @@ impl<P: Residuals> Fit<'_, P> {
             let some = self.rows_of(&state.r, kind);
             let taken: f64 =
                 leverages.iter().zip(self.noise).filter(|(_, n)| n.kind == Some(kind)).map(|(h, _)| h).sum();
-            let old = self.errors[kind];
-            let new = scatter(&some, some.len() as f64 - taken, self.search.loss) * correlated(&some);
-            let new = new.max(self.least[kind]);
             // An error far below the deviations of the readings does not matter.
             let std = some.iter().map(|(_, noise)| noise.std / noise.size).fold(0.0, f64::max);
-            change = change.max((new.hypot(std) / old.hypot(std)).ln().abs());
-            self.errors[kind] = new;
+            let total = |fit: &Self| fit.errors[kind].hypot(std * fit.shares[kind]);
+            let (old, freedom) = (total(self), some.len() as f64 - taken);
+            let error = scatter(&some, freedom, self.search.loss) * correlated(&some);
+            self.errors[kind] = error.max(self.least[kind]);
+            let share = |factor: f64| factor.clamp(MIN_SHARE, 1.0);
+            self.shares[kind] = misfit(&some, freedom, self.search.loss).map_or(1.0, share);
+            change = change.max((total(self) / old).ln().abs());
         }
         self.set_deviations();
         if change.is_nan() { 0.0 } else { change }
@@ -341,7 +366,7 @@ impl<P: Residuals> Fit<'_, P> {
     }
 
     /// Increases the damping until a step does not increase the cost. Returns whether there is one,
-    /// and its size over the deviations of the unknowns.
+    /// and its length in deviations of the unknowns.
     fn step(&self, state: &mut State) -> Result<(bool, f64), SolveError<P::Error>> {
         let cost = self.cost(&state.r, &state.x);
         if !cost.is_finite() {
@@ -367,13 +392,21 @@ impl<P: Residuals> Fit<'_, P> {
                 state.damping = (state.damping * 10.0).max(1e-10);
                 continue;
             };
-            size = step.iter().zip(diagonal.iter()).map(|(s, d)| s.abs() * d.sqrt()).fold(0.0, f64::max);
+            let square = step.dot(&(&normal * &step));
+            let expected = -(2.0 * gradient.dot(&step) + square);
+            size = square.sqrt();
             let mut moved = &state.x + &step;
             moved.iter_mut().zip(self.unknowns).for_each(|(x, unknown)| *x = x.max(unknown.lower));
             let mut J = DMatrix::zeros(0, 0);
             match evaluated(self.problem, &moved, &mut J) {
                 Ok(r) if self.cost(&r, &moved) <= cost * (1.0 + 1e-14) => {
-                    *state = State { x: moved, r, J, damping: (state.damping * 0.1).max(1e-12) };
+                    // Where the residuals curve, steps without damping pass the minimum again and again.
+                    let factor = match (cost - self.cost(&r, &moved)) / expected {
+                        gain if gain > GAIN.0 => 0.1,
+                        gain if gain < GAIN.1 => 10.0,
+                        _ => 1.0,
+                    };
+                    *state = State { x: moved, r, J, damping: (state.damping * factor).max(1e-10) };
                     return Ok((true, size));
                 }
                 // Converged to rounding.
@@ -490,6 +523,27 @@ fn correlated(rows: &[(f64, Noise)]) -> f64 {
     let square: f64 = rows.iter().map(|(r, _)| r * r).sum();
     let rho = (product / square.max(f64::MIN_POSITIVE)).clamp(0.0, MAX_CORRELATED);
     ((1.0 + rho) / (1.0 - rho)).sqrt()
+}
+
+/// Returns the ratio of the scatter of residuals to their given deviations if chance gives it less
+/// than once in a thousand cases; `None` if a deviation is not given.
+///
+/// * `freedom`: number of the residuals minus what the fit takes.
+pub(crate) fn misfit(rows: &[(f64, Noise)], freedom: f64, loss: Loss) -> Option<f64> {
+    if freedom < 0.5 || rows.iter().any(|(_, noise)| noise.std == 0.0) {
+        return None;
+    }
+    let over: Vec<f64> = rows.iter().map(|(r, noise)| r / noise.std).collect();
+    let factor = scale(&over, freedom, loss);
+    let [low, high] = chi_square_bounds(freedom);
+    (factor * factor > high || factor * factor < low).then_some(factor)
+}
+
+/// Returns the lower and upper 0.1 % quantiles of χ² over its degrees of freedom (Wilson and
+/// Hilferty).
+pub fn chi_square_bounds(freedom: f64) -> [f64; 2] {
+    let nine = 2.0 / (9.0 * freedom);
+    [-1.0, 1.0].map(|sign| (1.0 - nine + sign * RARE_QUANTILE * nine.sqrt()).max(0.0).powi(3))
 }
 
 /// Returns the ratio of the scatter of residuals to their deviations.
