@@ -26,8 +26,9 @@ pub(crate) const MAX_SHARE: f64 = 0.1;
 const SPLINE: f64 = 6.0;
 /// Maximum distance of smoothed positions from rounded ones, over the step of the rounding.
 const WITHIN_ROUNDING: f64 = 0.75;
-/// Maximum noise that rounding to a step explains, over the step; exactly 1/√12 for white noise.
-const OF_ROUNDING: f64 = 0.5;
+/// Maximum noise that rounding to a step explains, over the step: 1/√12 for white noise; for a slow
+/// motion the median fourth difference is three steps, which counts as 3/5.64.
+const OF_ROUNDING: f64 = 0.6;
 /// Number and duration (s) of equal samples that count as a hold, which smoothing keeps; slow motions
 /// of rounded positions have shorter ones.
 const HOLD: (usize, f64) = (10, 0.05);

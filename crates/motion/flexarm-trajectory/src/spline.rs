@@ -81,8 +81,10 @@ impl Samples {
         let knots: Vec<f64> = self.times.iter().map(|t| t - self.times[0]).collect();
         let (curves, notes): (Vec<Curve>, Vec<Option<Warning>>) = (self.joints.iter())
             .map(|joint| {
-                let (joint, note) = joint.judged(&knots);
-                (joint.curve(&knots), note)
+                let Judged { joint, note, smoothed } = joint.judged(&knots);
+                // What is left at the ends of holds by smoothing is no corner.
+                let corners = if smoothed { Vec::new() } else { corners(&knots, &joint.position) };
+                (joint.curve(&knots, &corners), note)
             })
             .unzip();
         let names = self.joints.iter().map(|joint| joint.name.clone()).collect();
@@ -230,22 +232,34 @@ impl JointSamples {
     }
 }
 
+/// Samples as they are used.
+struct Judged<'a> {
+    joint: Cow<'a, JointSamples>,
+    /// What is to be said about velocities and noise.
+    note: Option<Warning>,
+    /// Whether positions without corners were smoothed within their rounding.
+    smoothed: bool,
+}
+
 impl JointSamples {
-    /// The samples without velocities that are not theirs and without the noise of rounding, and
-    /// what is to be said about velocities and noise.
-    fn judged(&self, times: &[f64]) -> (Cow<'_, Self>, Option<Warning>) {
+    /// The samples without velocities that are not theirs and without the noise of rounding.
+    fn judged(&self, times: &[f64]) -> Judged<'_> {
         let (joint, position) = (self.name.clone(), &self.position);
+        let as_given = |note| Judged { joint: Cow::Borrowed(self), note, smoothed: false };
         if let Some(velocity) = &self.velocity {
-            let Some([miss, slope]) = foreign(times, position, velocity) else { return (Cow::Borrowed(self), None) };
+            let Some([miss, slope]) = foreign(times, position, velocity) else { return as_given(None) };
             let bare = Self { name: joint.clone(), position: position.clone(), ..Self::default() };
-            return (Cow::Owned(bare), Some(Warning::ForeignVelocities { joint, miss, slope }));
+            let note = Some(Warning::ForeignVelocities { joint, miss, slope });
+            return Judged { joint: Cow::Owned(bare), note, smoothed: false };
         }
         let Some(noise) = noise(times, position).filter(|noise| noise.share > MAX_SHARE) else {
-            return (Cow::Borrowed(self), None);
+            return as_given(None);
         };
         match without_rounding(times, position, &noise) {
-            Some(position) => (Cow::Owned(Self { position, ..self.clone() }), None),
-            None => (Cow::Borrowed(self), Some(Warning::Noise { joint, noise })),
+            Some(position) => {
+                Judged { joint: Cow::Owned(Self { position, ..self.clone() }), note: None, smoothed: true }
+            }
+            None => as_given(Some(Warning::Noise { joint, noise })),
         }
     }
 }
@@ -259,8 +273,7 @@ struct Rates {
 
 impl JointSamples {
     /// The curve through the samples, with an additional knot for each corner between two samples.
-    fn curve(&self, times: &[f64]) -> Curve {
-        let found = corners(times, &self.position);
+    fn curve(&self, times: &[f64], found: &[Corner]) -> Curve {
         let (mut knots, mut position, mut is_corner) = (Vec::new(), Vec::new(), Vec::new());
         let mut next = found.iter().peekable();
         for (i, (&t, &q)) in times.iter().zip(&self.position).enumerate() {

@@ -88,6 +88,41 @@ fn angles_of_six_digits_at_a_high_rate_are_smoothed_within_their_rounding() {
     }
 }
 
+/// Motions that end at rest, rounded: neither the start of the hold nor slow parts are corners or
+/// noise.
+#[test]
+fn rounded_motions_into_a_hold_have_neither_corners_nor_noise() {
+    let mut told = Vec::new();
+    for (rate, digits, end) in [
+        (2000.0, 6, 1.2),
+        (2000.0, 5, 1.2),
+        (1000.0, 6, 2.4),
+        (4000.0, 6, 0.8),
+        (500.0, 4, 1.6),
+        (250.0, 6, 16.0),
+        (100.0, 6, 48.0),
+        (125.0, 3, 3.2),
+    ] {
+        for (from, to) in [(0.0, 0.5), (-1.05, -0.8), (1.05, 0.85), (0.0, 0.3), (0.7, 0.45)] {
+            let scale = 10f64.powi(digits);
+            let n = (1.25 * end * rate) as u32;
+            let times: Vec<f64> = (0..=n).map(|k| f64::from(k) / rate).collect();
+            let at = |t: &f64| {
+                let u = (t / end).min(1.0);
+                ((from + (to - from) * u * u * u * (10.0 + u * (6.0 * u - 15.0))) * scale).round() / scale
+            };
+            let position = times.iter().map(at).collect();
+            let joint = JointSamples { name: "q".into(), position, ..JointSamples::default() };
+            let motion = Samples { times, joints: vec![joint] }.interpolate().unwrap();
+            let warnings = motion.warnings();
+            told.extend(
+                warnings.iter().map(|warning| format!("{rate} Hz, {digits} digits, {from} to {to}: {warning}")),
+            );
+        }
+    }
+    assert_eq!(told, [""; 0]);
+}
+
 #[test]
 fn smooth_motions_are_not_noisy_and_keep_their_bits() {
     for rate in [20.0, 100.0, 1000.0] {
