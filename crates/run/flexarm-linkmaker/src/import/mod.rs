@@ -49,7 +49,7 @@ use summary::Parts;
 pub use flexarm_fe_io::exchange::MatrixNames as Names;
 pub use flexarm_fem::matrix_link::PartMasses;
 pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
-pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
+pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportSummary, markdown, tables};
 pub use words::{FrameAt, ImportFormat, ImportMap, NodePlane, parse_inertia, parse_part, parse_split, triple};
 
 /// Warning about a modal link without its second-order terms, used here and where a robot uses such
