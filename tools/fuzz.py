@@ -1054,9 +1054,9 @@ def made_targets(run, folder):
     for name, words in (("bar.pch", nodes), ("bar.op4", ["--map", "A=#1-6,B=#7-12,modal=#13", *at]), ("bar.SID_FEM", ["--map", "A=1,B=2"])):
         command = ["import", name, "--units", "mm-t-s", *words, "--no-files", "--json"]
         targets.append(Target(f"matrix-{name}", name, {name: (stored / name).read_bytes()}, [command]))
-    run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--also", "arrow", "--quiet"],
-        ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--quiet"], ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
-    for name in ("run.csv", "run.mcap", "run.parquet", "run.arrow"):
+    run(["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--parquet", "--quiet"],
+        ["compare", "robot.toml", "motion.toml", "-o", "run", "--log-rate", "50", "--quiet"])
+    for name in ("run.csv", "run.mcap", "run.parquet"):
         path = folder / "run" / name
         if not path.exists():
             print(f"left out: recordings {name} (this build writes none)")

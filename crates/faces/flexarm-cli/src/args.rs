@@ -116,7 +116,7 @@ pub(crate) struct ModellingArgs {
 }
 
 /// Parser for the words of a choice, each with its help text.
-fn word_of<T: Words + Send + Sync>() -> impl TypedValueParser<Value = T> {
+pub(crate) fn word_of<T: Words + Send + Sync>() -> impl TypedValueParser<Value = T> {
     let known = T::WORDS.iter().map(|(word, _, means)| PossibleValue::new(*word).help(*means));
     PossibleValuesParser::new(known)
         .try_map(|given| T::from_word(&given).ok_or_else(|| format!("{given:?} is not known")))

@@ -9,7 +9,7 @@ use flexarm::compensate::{
 };
 use flexarm::{Motion, RunOptions, Scenario};
 
-use crate::args::{ModellingArgs, RobotArgs};
+use crate::args::{ModellingArgs, RobotArgs, word_of};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::motion::MotionInputArgs;
@@ -32,14 +32,6 @@ Examples:
       flexarm compare kr210 out/kr210_compensated-001/compensated.csv";
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum MethodName {
-    /// Inertia, damping and gravity, iterated on the simulation
-    Dynamic,
-    /// Gravity and constant loads only, point by point
-    Static,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
 pub(crate) enum ShaperName {
     /// Two copies half a period apart
     Zv,
@@ -48,16 +40,6 @@ pub(crate) enum ShaperName {
     /// Minimises the residual vibration of all modes that the motion excites, within --delay, for
     /// frequency errors up to --band
     Optimal,
-}
-
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum LimitName {
-    /// Slow the motion down; a violation that slowing does not remove is an error
-    Slow,
-    /// Stop with an error that lists all violations
-    Refuse,
-    /// List the violations and write the motion all the same
-    Tell,
 }
 
 #[derive(Debug, Args)]
@@ -71,8 +53,8 @@ pub(crate) struct CompensateArgs {
     #[command(flatten)]
     pub(crate) input: MotionInputArgs,
     /// Method of compensation
-    #[arg(long, value_enum, default_value = "dynamic")]
-    pub(crate) method: MethodName,
+    #[arg(long, value_parser = word_of::<Method>(), default_value = "dynamic")]
+    pub(crate) method: Method,
     /// Components of the TCP error to correct, of x, y, z, rx, ry, rz (world axes) [default: all]
     #[arg(long, value_name = "X,Y,...", value_delimiter = ',')]
     pub(crate) components: Vec<String>,
@@ -97,8 +79,8 @@ pub(crate) struct CompensateArgs {
     pub(crate) loads: Option<PathBuf>,
     /// Response to commands that exceed a limit of position, velocity, acceleration or torque which
     /// the motion itself respects
-    #[arg(long, value_enum, default_value = "slow")]
-    pub(crate) limits: LimitName,
+    #[arg(long, value_parser = word_of::<LimitRule>(), default_value = "slow")]
+    pub(crate) limits: LimitRule,
     /// Maximum acceleration of each joint in order (rad/s² or m/s²) [default: not checked]
     #[arg(long, value_name = "A1,A2,...", value_delimiter = ',', allow_hyphen_values = true)]
     pub(crate) accelerations: Vec<f64>,
@@ -182,10 +164,7 @@ pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode
     let request = CompensateRequest {
         modelling: args.modelling.modelling(),
         run: RunOptions { step_s: args.step, ..RunOptions::default() },
-        method: match args.method {
-            MethodName::Dynamic => Method::Dynamic,
-            MethodName::Static => Method::Static,
-        },
+        method: args.method,
         components: components(&args.components)?,
         iterations: args.iterations,
         cutoff_hz: args.cutoff,
@@ -193,11 +172,7 @@ pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode
         plant,
         sweep: !args.no_sweep,
         accelerations: args.accelerations.clone(),
-        limits: match args.limits {
-            LimitName::Refuse => LimitRule::Refuse,
-            LimitName::Slow => LimitRule::Slow,
-            LimitName::Tell => LimitRule::Tell,
-        },
+        limits: args.limits,
         output: folder.path(),
         motions: args.write.clone(),
         recording: !args.no_recording,

@@ -3,13 +3,11 @@
 use std::process::ExitCode;
 
 use flexarm::links::WordError;
-use flexarm::links::export::{ExportFormat, ExportJob};
-use flexarm::links::import::{
-    ImportFormat, ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple,
-};
+use flexarm::links::export::ExportJob;
+use flexarm::links::import::{ImportJob, ImportOutputs, Names, PartMasses, RigidPart, parse_inertia, triple};
 use flexarm::robots::RobotFormat;
 
-use crate::exchange_args::{ExportArgs, ExportFormatName, ImportArgs, ImportFormatName, RobotFormatName};
+use crate::exchange_args::{ExportArgs, ImportArgs};
 use crate::failure::Failure;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, answer_as_is, to_json, working};
@@ -33,11 +31,7 @@ pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode,
     let folder = OutputFolder::of(args.output.as_deref(), &stem, true)?;
     let job = ExportJob {
         link: args.input.clone(),
-        format: match format {
-            ExportFormatName::MatrixMarket => ExportFormat::MatrixMarket,
-            ExportFormatName::UserElement => ExportFormat::UserElement,
-            ExportFormatName::Simscape => ExportFormat::Simscape,
-        },
+        format,
         units,
         nodes: args.nodes.clone(),
         folder: folder.path().unwrap_or_default(),
@@ -51,10 +45,7 @@ pub(crate) fn export(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode,
 
 fn export_robot(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode, Failure> {
     let robot = args.load.load(&args.input)?;
-    let format = match args.to {
-        Some(RobotFormatName::Urdf) => RobotFormat::Urdf,
-        _ => RobotFormat::Mjcf,
-    };
+    let format = args.to.unwrap_or(RobotFormat::Mjcf);
     let at = Some(values::joint_values(args.at.as_deref(), &robot)?.map_or_else(|| robot.start_pose(), Ok)?);
     let name = robot.name.clone();
     let arm = robot.model(&args.modelling.modelling())?;
@@ -82,18 +73,7 @@ fn import_job(args: &ImportArgs) -> Result<ImportJob, Failure> {
     Ok(ImportJob {
         files: args.files.clone(),
         mass_file: args.mass_file.clone(),
-        format: match args.format {
-            ImportFormatName::Auto => None,
-            ImportFormatName::MatrixMarket => Some(ImportFormat::MatrixMarket),
-            ImportFormatName::UserElement => Some(ImportFormat::UserElement),
-            ImportFormatName::AbaqusText => Some(ImportFormat::AbaqusText),
-            ImportFormatName::Coordinate => Some(ImportFormat::Coordinate),
-            ImportFormatName::Dmig => Some(ImportFormat::Dmig),
-            ImportFormatName::Op4 => Some(ImportFormat::Op4),
-            ImportFormatName::HarwellBoeing => Some(ImportFormat::HarwellBoeing),
-            ImportFormatName::Simscape => Some(ImportFormat::Simscape),
-            ImportFormatName::Sid => Some(ImportFormat::Sid),
-        },
+        format: args.format,
         names: Names { stiffness: args.k_name.clone(), mass: args.m_name.clone() },
         units: args.units,
         map: args.map.clone(),

@@ -2,10 +2,14 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use crate::args::{ModellingArgs, RobotArgs};
-use flexarm::links::import::{FrameAt, ImportMap, RigidPart, Split, UnitsOfFile, parse_part, parse_split};
+use crate::args::{ModellingArgs, RobotArgs, word_of};
+use flexarm::links::export::ExportFormat;
+use flexarm::links::import::{
+    FrameAt, ImportFormat, ImportMap, RigidPart, Split, UnitsOfFile, parse_part, parse_split,
+};
+use flexarm::robots::RobotFormat;
 
 const IMPORT_EXAMPLES: &str = "\
 Examples:
@@ -44,8 +48,8 @@ pub(crate) struct ImportArgs {
     #[arg(required = true, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     /// Required format of the files; auto: by content
-    #[arg(long, value_enum, default_value_t = ImportFormatName::Auto, help_heading = "Matrices")]
-    pub(crate) format: ImportFormatName,
+    #[arg(long, value_parser = word_of::<ImportFormat>(), default_value = "auto", help_heading = "Matrices")]
+    pub(crate) format: ImportFormat,
     /// Units of the files: m-kg-s (N, Pa), mm-t-s (N, MPa), in-slinch-s, ...
     #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices")]
     pub(crate) units: Option<UnitsOfFile>,
@@ -127,8 +131,8 @@ pub(crate) struct ExportArgs {
     #[arg(value_name = "LINK.flex|ROBOT")]
     pub(crate) input: PathBuf,
     /// Simulator's format of a robot
-    #[arg(long, value_enum, help_heading = "Robots", required_unless_present = "format")]
-    pub(crate) to: Option<RobotFormatName>,
+    #[arg(long, value_parser = word_of::<RobotFormat>(), help_heading = "Robots", required_unless_present = "format")]
+    pub(crate) to: Option<RobotFormat>,
     /// Joint values of the pose at which the robot rests, as for statics
     #[arg(long, value_name = "Q1,Q2,...", help_heading = "Robots", allow_hyphen_values = true, requires = "to")]
     pub(crate) at: Option<String>,
@@ -137,8 +141,8 @@ pub(crate) struct ExportArgs {
     #[command(flatten)]
     pub(crate) load: RobotArgs,
     /// Format of the matrices of a link
-    #[arg(long, value_enum, help_heading = "Matrices", requires = "units", conflicts_with = "to")]
-    pub(crate) format: Option<ExportFormatName>,
+    #[arg(long, value_parser = word_of::<ExportFormat>(), help_heading = "Matrices", requires = "units", conflicts_with = "to")]
+    pub(crate) format: Option<ExportFormat>,
     /// Units to write: m-kg-s (N), mm-t-s (N, MPa), ...
     #[arg(long, value_name = "LENGTH-MASS-TIME", help_heading = "Matrices", requires = "format")]
     pub(crate) units: Option<UnitsOfFile>,
@@ -152,38 +156,4 @@ pub(crate) struct ExportArgs {
     /// Overwrite existing files
     #[arg(long, help_heading = "Files")]
     pub(crate) force: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ImportFormatName {
-    Auto,
-    MatrixMarket,
-    UserElement,
-    /// node,dof,node,dof,value
-    AbaqusText,
-    /// row column value (Abaqus COORDINATE, CalculiX .sti)
-    Coordinate,
-    Dmig,
-    Op4,
-    HarwellBoeing,
-    Simscape,
-    Sid,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum RobotFormatName {
-    /// MuJoCo: springs as joint stiffness and tendons
-    Mjcf,
-    /// A joint per elastic coordinate, with springs.json; Pinocchio, Drake
-    Urdf,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ExportFormatName {
-    /// With a .toml of units and frames
-    MatrixMarket,
-    /// CalculiX, Abaqus
-    UserElement,
-    /// Comma-separated values and a script
-    Simscape,
 }

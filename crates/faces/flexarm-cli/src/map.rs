@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use flexarm::links::reduce::numbers;
 use flexarm::map::{
     JointRange, KeptPoses, Map, MapPose, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map, quantity_text,
@@ -11,7 +11,7 @@ use flexarm::map::{
 };
 use flexarm::{Motion, Robot};
 
-use crate::args::{ModellingArgs, RobotArgs};
+use crate::args::{ModellingArgs, RobotArgs, word_of};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::lobes::cutting_tool;
@@ -40,17 +40,6 @@ Examples:
   How deep an end mill may cut before it chatters, over a table:
       flexarm map kr210 --box 1.2:2.4,-0.6:0.6,0.6:0.6 --grid 0.1 \\
           --tool endmill_20mm --rpm 8000";
-
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
-pub(crate) enum KeepName {
-    /// The best pose at each position
-    #[default]
-    Best,
-    /// The worst pose at each position
-    Worst,
-    /// All poses
-    All,
-}
 
 #[derive(Debug, Args)]
 #[command(after_long_help = EXAMPLES, after_help = "More, with examples: flexarm map --help")]
@@ -122,8 +111,8 @@ pub(crate) struct MapArgs {
     #[arg(long, help_heading = "What", value_name = "NAME")]
     pub(crate) by: Option<String>,
     /// Poses to keep at each position, of all directions and branches
-    #[arg(long, help_heading = "What", value_enum, default_value = "best")]
-    pub(crate) keep: KeepName,
+    #[arg(long, help_heading = "What", value_parser = word_of::<KeptPoses>(), default_value = "best")]
+    pub(crate) keep: KeptPoses,
     /// Number of natural frequencies
     #[arg(long, help_heading = "What", value_name = "N", default_value_t = 3)]
     pub(crate) frequencies: usize,
@@ -232,11 +221,7 @@ pub(crate) fn run(terminal: &Terminal, args: &MapArgs) -> Result<ExitCode, Failu
         wrench,
         tool: args.tool.as_ref().map(|given| cutting_tool(given, &args.rpm)).transpose()?,
         frequencies: Some(args.frequencies),
-        keep: match args.keep {
-            KeepName::Best => KeptPoses::Best,
-            KeepName::Worst => KeptPoses::Worst,
-            KeepName::All => KeptPoses::All,
-        },
+        keep: args.keep,
         by: args.by.clone(),
         workpiece_m,
         output: folder.path(),

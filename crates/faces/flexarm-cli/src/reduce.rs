@@ -2,13 +2,11 @@
 
 use std::process::ExitCode;
 
-use flexarm::links::reduce::{
-    At, InterfaceEntry, OrderingChoice, QuadratureChoice, ReduceJob, ReduceOptions, ReduceOutputs, UrdfEntry,
-};
+use flexarm::links::reduce::{At, InterfaceEntry, ReduceJob, ReduceOptions, ReduceOutputs, UrdfEntry};
 
 use crate::failure::Failure;
 use crate::print;
-use crate::reduce_args::{NamedValue, OrderingName, PlaceWord, QuadratureName, ReduceArgs};
+use crate::reduce_args::{NamedValue, PlaceWord, ReduceArgs};
 use crate::shipped::OutputFolder;
 use crate::terminal::{Spinner, Terminal, answer, answer_as_is, to_json};
 
@@ -53,15 +51,8 @@ fn flags(args: &ReduceArgs) -> Result<ReduceJob, Failure> {
         geometric: args.geometric.then_some(true),
         stress: args.stress.then_some(true),
         merge: args.merge,
-        quadrature: args.quadrature.map(|name| match name {
-            QuadratureName::Exact => QuadratureChoice::Exact,
-            QuadratureName::Calculix => QuadratureChoice::Calculix,
-        }),
-        ordering: args.ordering.map(|name| match name {
-            OrderingName::Auto => OrderingChoice::Auto,
-            OrderingName::Amd => OrderingChoice::Amd,
-            OrderingName::Nested => OrderingChoice::Nested,
-        }),
+        quadrature: args.quadrature,
+        ordering: args.ordering,
         mesh_frame: args.mesh_frame,
         urdf: urdf.map(|(file, link)| UrdfEntry { file, link, joint: args.joint.clone(), rest: args.rest }),
         ..ReduceJob::default()

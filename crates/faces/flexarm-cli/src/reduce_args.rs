@@ -3,8 +3,12 @@
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use clap::{Args, ValueEnum};
-use flexarm::links::reduce::{FrameEntry, MaterialChoice, NodeSelector, SplitChoice, Tie, Units, numbers};
+use clap::Args;
+use flexarm::links::reduce::{
+    FrameEntry, MaterialChoice, NodeSelector, OrderingChoice, QuadratureChoice, SplitChoice, Tie, Units, numbers,
+};
+
+use crate::args::word_of;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -119,11 +123,11 @@ pub(crate) struct ReduceArgs {
     #[arg(long, value_name = "DISTANCE", allow_hyphen_values = true)]
     pub(crate) merge: Option<f64>,
     /// Quadrature of the elements
-    #[arg(long, value_enum, help_heading = "Reduction", hide_short_help = true)]
-    pub(crate) quadrature: Option<QuadratureName>,
+    #[arg(long, value_parser = word_of::<QuadratureChoice>(), help_heading = "Reduction", hide_short_help = true)]
+    pub(crate) quadrature: Option<QuadratureChoice>,
     /// Order of elimination
-    #[arg(long, value_enum, help_heading = "Reduction", hide_short_help = true)]
-    pub(crate) ordering: Option<OrderingName>,
+    #[arg(long, value_parser = word_of::<OrderingChoice>(), help_heading = "Reduction", hide_short_help = true)]
+    pub(crate) ordering: Option<OrderingChoice>,
     /// Name of the link [default: that of --link, or of the mesh file]
     #[arg(long, value_name = "NAME", help_heading = "Mesh")]
     pub(crate) name: Option<String>,
@@ -207,22 +211,4 @@ impl FromStr for TieWord {
             other => Err(format!("{other:?} is not a tie; expected rigid or distributing")),
         }
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum QuadratureName {
-    /// Sufficient points for stiffness and mass [default]
-    Exact,
-    /// The points of CalculiX, for comparison with it
-    Calculix,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum OrderingName {
-    /// By size [default]
-    Auto,
-    /// Approximate minimum degree
-    Amd,
-    /// Nested dissection
-    Nested,
 }

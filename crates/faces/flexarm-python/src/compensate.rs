@@ -2,9 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm::compensate::{
-    CompensateRequest, Compensation, LimitRule, Method, ShaperKind, Shaping, compensate_motion_until,
-};
+use flexarm::compensate::{CompensateRequest, Compensation, ShaperKind, Shaping, compensate_motion_until};
 use flexarm::{Motion, RunOptions};
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -17,7 +15,7 @@ use crate::motion::PyMotion;
 use crate::parts::{Parts, Pickled};
 use crate::robot::PyRobot;
 use crate::scenario::scenario;
-use crate::values::{modelling, texts, whole, word};
+use crate::values::{choice, modelling, texts, whole, word};
 use crate::watch::stoppable;
 
 const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
@@ -186,13 +184,12 @@ pub(crate) fn compensate<'py>(
     let chosen = chosen_components(components.as_deref())?;
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let accelerations = accelerations.map(|a| numbers("accelerations", a, &[(n, "joints")], false)).transpose()?;
-    let rules = [("slow", LimitRule::Slow), ("refuse", LimitRule::Refuse), ("tell", LimitRule::Tell)];
     let optimal = Shaping::Optimal { delay_s: delay, band };
     let shapers = [("zv", ShaperKind::Zv.into()), ("zvd", ShaperKind::Zvd.into()), ("optimal", optimal)];
     let request = CompensateRequest {
         modelling: modelling(links, drives, None, None)?,
         run: RunOptions { step_s: step, ..RunOptions::default() },
-        method: word("method", method, &[("dynamic", Method::Dynamic), ("static", Method::Static)])?,
+        method: choice("method", method)?,
         components: chosen,
         iterations,
         cutoff_hz,
@@ -200,7 +197,7 @@ pub(crate) fn compensate<'py>(
         plant: plant.map(|plant| (plant.get().robot.name.clone(), (*plant.get().robot).clone())),
         sweep,
         accelerations: accelerations.map_or_else(Vec::new, |a| a.values().to_vec()),
-        limits: word("limits", limits, &rules)?,
+        limits: choice("limits", limits)?,
         output,
         motions: write.unwrap_or_default(),
         overwrite,

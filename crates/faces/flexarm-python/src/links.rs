@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use flexarm::links::export::{ExportFormat, ExportJob, export};
+use flexarm::links::export::{ExportJob, export};
 use flexarm::links::import::{ImportFormat, ImportJob, ImportOutputs, import};
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, ReduceProgress, reduce as reduce_job};
 use pyo3::exceptions::PyValueError;
@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 
 use crate::caveat;
 use crate::failure::OrRaise;
-use crate::values::{maybe_whole, path, texts, word};
+use crate::values::{choice, maybe_whole, path, texts};
 use crate::watch::{stoppable, stoppable_telling};
 
 /// Reduces a mesh to a flexible link and writes its files.
@@ -84,18 +84,6 @@ fn parsed<T: std::str::FromStr<Err: std::fmt::Display>>(argument: &str, text: Op
     text.map(|text| text.parse().map_err(wrong)).transpose()
 }
 
-const FORMATS: [(&str, ImportFormat); 9] = [
-    ("matrix-market", ImportFormat::MatrixMarket),
-    ("user-element", ImportFormat::UserElement),
-    ("abaqus-text", ImportFormat::AbaqusText),
-    ("coordinate", ImportFormat::Coordinate),
-    ("dmig", ImportFormat::Dmig),
-    ("op4", ImportFormat::Op4),
-    ("harwell-boeing", ImportFormat::HarwellBoeing),
-    ("simscape", ImportFormat::Simscape),
-    ("sid", ImportFormat::Sid),
-];
-
 /// Creates a flexible link from matrices of another finite element program.
 ///
 /// Parameters
@@ -147,7 +135,7 @@ pub(crate) fn import_link<'py>(
     }
     let job = ImportJob {
         files: paths("files", files)?,
-        format: format.map(|found| word("format", found, &FORMATS)).transpose()?,
+        format: format.map_or(Ok(ImportFormat::Auto), |found| choice("format", found))?,
         units: parsed("units", units)?,
         map: parsed("map", map)?,
         at: frames,
@@ -160,12 +148,6 @@ pub(crate) fn import_link<'py>(
     let summary = stoppable(py, move |_| import(&job, outputs.as_ref()))?.or_raise()?;
     caveat::answer(py, &summary, &summary.caveats)
 }
-
-const EXPORTS: [(&str, ExportFormat); 3] = [
-    ("matrix-market", ExportFormat::MatrixMarket),
-    ("user-element", ExportFormat::UserElement),
-    ("simscape", ExportFormat::Simscape),
-];
 
 /// Writes the matrices of a link for another program.
 ///
@@ -198,7 +180,7 @@ pub(crate) fn export_link<'py>(
     overwrite: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
     crate::command::name_keywords();
-    let format = word("format", format, &EXPORTS)?;
+    let format = choice("format", format)?;
     let units = units.parse().map_err(|error| PyValueError::new_err(format!("units: {error}")))?;
     let job = ExportJob { link, format, units, nodes: nodes.unwrap_or_default(), folder: output, overwrite };
     let summary = stoppable(py, move |_| export(&job))?.or_raise()?;

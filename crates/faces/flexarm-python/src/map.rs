@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use flexarm::map::{JointRange, KeptPoses, Map, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map as take};
+use flexarm::map::{JointRange, Map, MapRegion, MapRequest, ToolDirections, WorkspaceGrid, map as take};
 use flexarm::{Motion, Robot};
 use pyo3::exceptions::{PyKeyError, PyValueError};
 use pyo3::prelude::*;
@@ -19,7 +19,7 @@ use crate::parts::{Parts, Pickled};
 use crate::robot::PyRobot;
 use crate::run_arguments::progress_function;
 use crate::scenario::scenario;
-use crate::values::{maybe_whole, modelling, whole, word, wrench};
+use crate::values::{choice, maybe_whole, modelling, whole, wrench};
 use crate::watch::stoppable_telling;
 
 /// Sag, compliance, frequencies and error under load at many poses. Created by :func:`flexarm.map`.
@@ -254,7 +254,6 @@ pub(crate) fn map<'py>(
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let grid = GridArguments { bounds, spacing, keep_out, tool_axis, roll, cone, tilts, rolls };
     let region = region(robot, n, Places { joints, poses, along, points }, &grid)?;
-    let kept = [("best", KeptPoses::Best), ("worst", KeptPoses::Worst), ("all", KeptPoses::All)];
     let at = at.map(|at| numbers("at", at, &[(n, "joints")], false)).transpose()?;
     let request = MapRequest {
         modelling: modelling(links, drives, None, None)?,
@@ -262,7 +261,7 @@ pub(crate) fn map<'py>(
         at: at.map(|at| at.values().to_vec()),
         wrench: self::wrench(wrench)?,
         frequencies: Some(frequencies),
-        keep: word("keep", keep, &kept)?,
+        keep: choice("keep", keep)?,
         by,
         tool: tool.map(|tool| cutting_tool(py, &tool, rpm)).transpose()?,
         workpiece_m: workpiece.map(|edges| three("workpiece", edges)).transpose()?,

@@ -29,7 +29,7 @@ pub(crate) fn word<T: Copy>(argument: &str, found: &str, words: &[(&str, T)]) ->
 }
 
 /// Returns the value of a word, as [`word`].
-fn choice<T: Words>(argument: &str, found: &str) -> PyResult<T> {
+pub(crate) fn choice<T: Words>(argument: &str, found: &str) -> PyResult<T> {
     let words: Vec<_> = T::WORDS.iter().map(|(word, value, _)| (*word, *value)).collect();
     word(argument, found, &words)
 }

@@ -17,7 +17,7 @@ use flexarm_fe_io::exchange::{
 use flexarm_fem::reduction::{InterfaceFrame, Superelement};
 use flexarm_fem::{Pose, ReducedLink, UnitSystem, read_flex};
 use flexarm_files::{check_apart, check_free, file_stem, write_all};
-use flexarm_settings::Setting;
+use flexarm_settings::{Setting, Words};
 use nalgebra::{DMatrix, Translation3};
 use serde::Serialize;
 
@@ -37,15 +37,12 @@ pub enum ExportFormat {
     Simscape,
 }
 
-impl ExportFormat {
-    /// Name of the format on the command line.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::MatrixMarket => "matrix-market",
-            Self::UserElement => "user-element",
-            Self::Simscape => "simscape",
-        }
-    }
+impl Words for ExportFormat {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("matrix-market", Self::MatrixMarket, "With a .toml of units and frames"),
+        ("user-element", Self::UserElement, "CalculiX, Abaqus"),
+        ("simscape", Self::Simscape, "Comma-separated values and a script"),
+    ];
 }
 
 /// Link to export, format and output folder.
@@ -153,7 +150,7 @@ pub fn export(job: &ExportJob) -> Result<ExportSummary, LinkError> {
     let whole = link.rigid();
     Ok(ExportSummary {
         link: link.name.clone(),
-        format: job.format.name(),
+        format: job.format.word().unwrap_or_default(),
         units: job.units.name(),
         rows: element.K.nrows(),
         modes: element.modes(),
@@ -330,7 +327,7 @@ impl Content<'_> {
              interface\nunits: {units} (length-mass-time; derived unit of force = {} N); angles in rad\n\nmap for \
              flexarm import: {} \"{}\" {} {units}\n\ninterfaces (position in the unit of length, link axes):\n",
             self.link.name,
-            self.job.format.name(),
+            self.job.format.word().unwrap_or_default(),
             self.row_order(),
             units.force(),
             Setting::Map,

@@ -38,6 +38,7 @@ use std::sync::Arc;
 pub use flexarm_analysis::{
     Inversion, InversionError, Node, NodeServo, OptimalShaper, ShapedMode, Shaper, ShaperError, ShaperKind,
 };
+use flexarm_settings::Words;
 pub use flexarm_stepping::{StaticTargets, TargetError, static_targets};
 use flexarm_trajectory::Trajectory;
 use serde::Serialize;
@@ -70,6 +71,13 @@ pub enum Method {
     Dynamic,
     /// Includes gravity and constant loads only, point by point.
     Static,
+}
+
+impl Words for Method {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("dynamic", Self::Dynamic, "Inertia, damping and gravity, iterated on the simulation"),
+        ("static", Self::Static, "Gravity and constant loads only, point by point"),
+    ];
 }
 
 /// Input of [`compensate_motion`].

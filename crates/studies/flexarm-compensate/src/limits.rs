@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use flexarm_settings::Words;
 use flexarm_trajectory::{Extreme, JointLimits};
 
 use super::{CompensateError, CompensateRequest, Compensation, MotionPair, Stop, attempt};
@@ -29,6 +30,14 @@ pub enum LimitRule {
     Refuse,
     /// Report them in the result, with a caveat.
     Tell,
+}
+
+impl Words for LimitRule {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("slow", Self::Slow, "Slow the motion down; a violation that slowing does not remove is an error"),
+        ("refuse", Self::Refuse, "Stop with an error that lists all violations"),
+        ("tell", Self::Tell, "List the violations and write the motion all the same"),
+    ];
 }
 
 /// Returns the limits violated by a motion, including the drive limits for the peak efforts of its

@@ -43,6 +43,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_kinematics::Model;
+use flexarm_settings::Words;
 use serde::Serialize;
 
 pub use columns::MapColumn;
@@ -85,6 +86,14 @@ pub enum KeptPoses {
     Worst,
     /// All poses.
     All,
+}
+
+impl Words for KeptPoses {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("best", Self::Best, "The best pose at each position"),
+        ("worst", Self::Worst, "The worst pose at each position"),
+        ("all", Self::All, "All poses"),
+    ];
 }
 
 /// Input of [`map()`].

@@ -301,15 +301,8 @@ impl Parser {
             if self.is_symbol(open) && !matches!(inner.kind, Kind::List(_) | Kind::Literal(_)) {
                 self.advance();
                 let close = if self.syntax == Syntax::Rapid { "}" } else { "]" };
-                let mut indices = Vec::new();
-                while !self.is_symbol(close) {
-                    indices.push(self.expression()?);
-                    if !self.take_symbol(",") {
-                        break;
-                    }
-                }
-                let end = self.expect_symbol(close)?;
-                let span = inner.span.to(end);
+                let indices = self.expressions(close)?;
+                let span = inner.span.to(self.last_span());
                 // In KRL empty brackets denote a whole array.
                 inner = if indices.is_empty() {
                     Expr { span, ..inner }
@@ -330,9 +323,14 @@ impl Parser {
     /// Parses `[a, b, c]`.
     fn list(&mut self) -> Result<Vec<Expr>> {
         self.expect_symbol("[")?;
+        self.expressions("]")
+    }
+
+    /// Parses `a, b, c]` to its closing symbol.
+    pub(crate) fn expressions(&mut self, close: &str) -> Result<Vec<Expr>> {
         let mut elements = Vec::new();
         self.pass_lines();
-        while !self.is_symbol("]") {
+        while !self.is_symbol(close) {
             elements.push(self.expression()?);
             self.pass_lines();
             if !self.take_symbol(",") {
@@ -340,8 +338,24 @@ impl Parser {
             }
             self.pass_lines();
         }
-        self.expect_symbol("]")?;
+        self.expect_symbol(close)?;
         Ok(elements)
+    }
+
+    /// Parses the labels `a, b` of a case.
+    pub(crate) fn labels(&mut self) -> Result<Vec<Expr>> {
+        let mut labels = vec![self.expression()?];
+        while self.take_symbol(",") {
+            labels.push(self.expression()?);
+        }
+        Ok(labels)
+    }
+
+    /// Skips to the next token of this kind.
+    pub(crate) fn skip_to(&mut self, end: &Token) {
+        while !self.is_over() && self.peek() != end {
+            self.advance();
+        }
     }
 
     /// Skips line ends within brackets, where URScript allows them.

@@ -74,6 +74,18 @@ impl Text {
 /// Maximum number of characters of a statement in a message or a move.
 const LONGEST_EXCERPT: usize = 100;
 
+/// Returns the text with blanks in place of the lines that begin with `first`, which are not of the
+/// language (`&ACCESS RVP`, `$ 3 "MoveJ"`); positions do not change.
+pub(crate) fn without_lines(text: &str, first: char) -> String {
+    let line = |line: &str| if line.trim_start().starts_with(first) { blank(line) } else { line.to_owned() };
+    text.split_inclusive('\n').map(line).collect()
+}
+
+/// Returns blanks of the same length and number of lines.
+pub(crate) fn blank(text: &str) -> String {
+    text.chars().map(|c| if c == '\n' { "\n".to_owned() } else { " ".repeat(c.len_utf8()) }).collect()
+}
+
 /// Whether a name is one of the words of a text, which blanks separate.
 pub(crate) fn is_among(name: &str, words: &str) -> bool {
     words.split(' ').any(|word| word == name)

@@ -21,7 +21,6 @@ use std::rc::Rc;
 use crate::common::machine::{Flow, Machine};
 use crate::common::recorder::{Recorded, Recorder};
 use crate::common::tree::{Action, Routine, Statement};
-use crate::common::value::Value;
 use crate::common::{Result, Span, Text, fail};
 use crate::{ReadOptions, decode, given_text};
 
@@ -55,14 +54,12 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     machine.recorder.note_files();
     machine.run(&given.main)?;
     for further in &data {
-        run_data(&mut machine, &further.data);
+        machine.declare_all(&further.data);
     }
-    run_data(&mut machine, &unit.data);
+    machine.declare_all(&unit.data);
     machine.run(&given.main)?; // takes precedence over the files
     machine.dialect.is_given = false;
-    for routine in unit.routines {
-        machine.routines.entry(routine.name.clone()).or_insert_with(|| Rc::new(routine));
-    }
+    machine.add(unit.routines);
     let name = match &entry {
         Some(name) => {
             run_routine(&mut machine, name)?;
@@ -185,19 +182,6 @@ fn called(body: &[Statement], names: &mut Vec<Rc<str>>) {
                 called(body, names);
             }
             _ => {}
-        }
-    }
-}
-
-/// Runs the declarations of a data list; an unreadable one is an error only where its name is used.
-fn run_data(machine: &mut Machine<'_, Krl>, data: &[Statement]) {
-    for statement in data {
-        if let Err(fail) = machine.run(std::slice::from_ref(statement))
-            && let Action::Declare { name, .. } = &statement.action
-        {
-            let line = machine.recorder.line(statement.span);
-            let what = format!("`{name}`, whose declaration in line {line} cannot be read ({})", fail.message);
-            machine.set_global(name, Value::Outside(what.into()));
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::common::expressions::{Parser, Syntax};
 use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Argument, Expr, Kind, Operator, Parameter, Routine, Statement};
 use crate::common::value::Value;
-use crate::common::{Fail, Result, Span, Text, fail, is_among};
+use crate::common::{Fail, Result, Span, Text, fail, is_among, without_lines};
 
 pub(crate) const SPELLING: Spelling = Spelling {
     comment: ';',
@@ -38,7 +38,7 @@ pub(super) const MOTIONS: &str =
     "ptp lin circ ptp_rel lin_rel circ_rel sptp slin scirc spl sptp_rel slin_rel scirc_rel spl_rel asyptp";
 
 pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
-    let mut parser = Parser::new(Syntax::Krl, tokens(&without_header(&text.text), file, &SPELLING)?);
+    let mut parser = Parser::new(Syntax::Krl, tokens(&without_lines(&text.text, '&'), file, &SPELLING)?);
     let mut unit = Unit::default();
     while !parser.is_over() {
         pass_empty_lines(&mut parser);
@@ -63,17 +63,6 @@ pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     Ok(unit)
 }
 
-/// Replaces the controller's own lines (`&ACCESS RVP`) by blanks, so that positions do not change.
-fn without_header(text: &str) -> String {
-    let blank = |line: &str| -> String {
-        if !line.trim_start().starts_with('&') {
-            return line.to_owned();
-        }
-        line.chars().map(|c| if c == '\n' { "\n".to_owned() } else { " ".repeat(c.len_utf8()) }).collect()
-    };
-    text.split_inclusive('\n').map(blank).collect()
-}
-
 fn pass_empty_lines(parser: &mut Parser) {
     while !parser.is_over() && *parser.peek() == Token::Line {
         parser.advance();
@@ -82,9 +71,7 @@ fn pass_empty_lines(parser: &mut Parser) {
 
 /// Skips to the beginning of the next line.
 fn pass_line(parser: &mut Parser) {
-    while !parser.is_over() && *parser.peek() != Token::Line {
-        parser.advance();
-    }
+    parser.skip_to(&Token::Line);
     parser.advance();
 }
 
@@ -265,11 +252,7 @@ fn switch(parser: &mut Parser) -> Result<Action> {
     let ends = ["case", "default", "endswitch"];
     loop {
         if parser.take_word("case") {
-            let mut labels = vec![parser.expression()?];
-            while parser.take_symbol(",") {
-                labels.push(parser.expression()?);
-            }
-            cases.push((labels, block(parser, &ends)?));
+            cases.push((parser.labels()?, block(parser, &ends)?));
         } else if parser.take_word("default") {
             otherwise = block(parser, &ends)?;
         } else if parser.take_word("endswitch") {
@@ -283,11 +266,11 @@ fn switch(parser: &mut Parser) -> Result<Action> {
 /// Parses a statement of one line; a declaration may give several.
 fn simple(parser: &mut Parser, word: &str) -> Result<Vec<Action>> {
     let still = |parser: &mut Parser, what: &'static str| {
-        skip_rest(parser);
+        parser.skip_to(&Token::Line);
         Ok(vec![Action::Still(what)])
     };
     let none = |parser: &mut Parser| {
-        skip_rest(parser);
+        parser.skip_to(&Token::Line);
         Ok(Vec::new())
     };
     if is_assigned(parser) || parser.is_symbol_ahead(1, "[") || parser.is_symbol_ahead(1, ".") {
@@ -338,14 +321,8 @@ fn take(parser: &mut Parser, action: Action) -> Action {
     action
 }
 
-fn skip_rest(parser: &mut Parser) {
-    while *parser.peek() != Token::Line {
-        parser.advance();
-    }
-}
-
 fn refuse(parser: &mut Parser, message: &str) -> Result<Vec<Action>> {
-    skip_rest(parser);
+    parser.skip_to(&Token::Line);
     Ok(vec![Action::Refused(message.into())])
 }
 
@@ -365,23 +342,14 @@ fn assignment(parser: &mut Parser) -> Result<Vec<Action>> {
 fn declaration(parser: &mut Parser) -> Result<Vec<Action>> {
     while ["decl", "global", "const", "public"].iter().any(|word| parser.take_word(word)) {}
     if parser.word().is_some_and(|word| ["struc", "enum", "signal"].contains(&&*word)) {
-        skip_rest(parser);
+        parser.skip_to(&Token::Line);
         return Ok(Vec::new());
     }
     let kind = parser.expect_name()?;
     let mut declared = Vec::new();
     loop {
         let name = parser.expect_name()?;
-        let mut sizes = Vec::new();
-        if parser.take_symbol("[") {
-            while !parser.is_symbol("]") {
-                sizes.push(parser.expression()?);
-                if !parser.take_symbol(",") {
-                    break;
-                }
-            }
-            parser.expect_symbol("]")?;
-        }
+        let sizes = if parser.take_symbol("[") { parser.expressions("]")? } else { Vec::new() };
         let value = if parser.take_symbol("=") { Some(parser.expression()?) } else { None };
         declared.push(Action::Declare { kind: kind.clone(), name, sizes, value });
         if !parser.take_symbol(",") {

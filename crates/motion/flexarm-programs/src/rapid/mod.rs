@@ -57,7 +57,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     machine.dialect.records = unit.records;
     machine.recorder.note_files();
     machine.run(&given.main)?;
-    declare(&mut machine, &unit.data);
+    machine.declare_all(&unit.data);
     machine.run(&given.main)?; // takes precedence over the files
     machine.dialect.is_given = false;
     let file_entry = match entries.as_slice() {
@@ -65,9 +65,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
         _ => "main".into(),
     };
     let entry = options.entry.as_ref().map_or(file_entry, |entry| entry.to_lowercase().into());
-    for routine in unit.routines {
-        machine.routines.entry(routine.name.clone()).or_insert_with(|| Rc::new(routine));
-    }
+    machine.add(unit.routines);
     let name = match machine.routines.get(&entry).cloned() {
         Some(routine) => {
             if let Flow::Leave | Flow::Again = machine.invoke(&routine, &[], routine.span)? {
@@ -127,20 +125,6 @@ fn add_siblings(texts: &mut Vec<Text>, unit: &mut parse::Unit) -> Result<()> {
         let (text, _) = siblings.remove(at);
         texts.push(text);
         unit.take_in(parse::parse(&texts[texts.len() - 1], texts.len() - 1)?);
-    }
-}
-
-/// Runs the declarations of modules; an unreadable one is an error only where its name is used.
-fn declare(machine: &mut Rapids<'_>, data: &[Statement]) {
-    use crate::common::tree::Action;
-    for statement in data {
-        if let Err(fail) = machine.run(std::slice::from_ref(statement))
-            && let Action::Declare { name, .. } = &statement.action
-        {
-            let line = machine.recorder.line(statement.span);
-            let what = format!("`{name}`, whose declaration in line {line} cannot be read ({})", fail.message);
-            machine.set_global(name, Value::Outside(what.into()));
-        }
     }
 }
 

@@ -7,7 +7,7 @@ use super::types::{Fields, Records};
 use crate::common::expressions::{Parser, Syntax};
 use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Argument, Expr, Kind, Parameter, Routine, Statement};
-use crate::common::{Fail, Result, Span, Text, fail};
+use crate::common::{Fail, Result, Span, Text, blank, fail};
 
 pub(crate) const SPELLING: Spelling = Spelling {
     comment: '!',
@@ -111,9 +111,7 @@ fn without_header(text: &str) -> String {
     let header =
         text[start..].strip_prefix("%%%").and_then(|rest| rest.find("%%%")).map(|length| start + 3 + length + 3);
     let Some(end) = header else { return text.to_owned() };
-    let blanks: String =
-        text[..end].chars().map(|c| if c == '\n' { "\n".to_owned() } else { " ".repeat(c.len_utf8()) }).collect();
-    blanks + &text[end..]
+    blank(&text[..end]) + &text[end..]
 }
 
 /// Skips the next semicolon.
@@ -318,10 +316,7 @@ fn test(parser: &mut Parser) -> Result<Action> {
     let (mut cases, mut otherwise) = (Vec::new(), Vec::new());
     loop {
         if parser.take_word("case") {
-            let mut labels = vec![parser.expression()?];
-            while parser.take_symbol(",") {
-                labels.push(parser.expression()?);
-            }
+            let labels = parser.labels()?;
             parser.expect_symbol(":")?;
             cases.push((labels, block(parser, &ends)?));
         } else if parser.take_word("default") {
@@ -351,22 +346,24 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
             return Ok(Action::Halt);
         }
         "goto" => {
-            skip(parser);
-            return Ok(Action::Refused("jumps (GOTO) are not read: write a loop or a branch".into()));
+            return skipped(parser, Action::Refused("jumps (GOTO) are not read: write a loop or a branch".into()));
         }
         "raise" | "retry" | "trynext" => {
-            skip(parser);
-            return Ok(Action::Refused("errors and their handlers are not simulated: take the statement out".into()));
+            return skipped(
+                parser,
+                Action::Refused("errors and their handlers are not simulated: take the statement out".into()),
+            );
         }
         "connect" => {
-            skip(parser);
-            return Ok(Action::Still("interrupts are not simulated: none comes"));
+            return skipped(parser, Action::Still("interrupts are not simulated: none comes"));
         }
         _ => {}
     }
     if parser.is_symbol("%") {
-        skip(parser);
-        return Ok(Action::Refused("calls by a text (%...%) are not read: write the name of the routine".into()));
+        return skipped(
+            parser,
+            Action::Refused("calls by a text (%...%) are not read: write the name of the routine".into()),
+        );
     }
     if parser.word().is_some() && parser.is_symbol_ahead(1, ":") {
         // A label is skipped; the statement after it is parsed.
@@ -384,10 +381,9 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
     call(parser)
 }
 
-fn skip(parser: &mut Parser) {
-    while !parser.is_over() && !parser.is_symbol(";") {
-        parser.advance();
-    }
+fn skipped(parser: &mut Parser, action: Action) -> Result<Action> {
+    parser.skip_to(&Token::Symbol(";"));
+    Ok(action)
 }
 
 /// Parses `Name a, b \C:=d;`.
@@ -409,17 +405,8 @@ fn declaration(parser: &mut Parser) -> Result<Action> {
     while ["local", "task", "pers", "var", "const"].iter().any(|word| parser.take_word(word)) {}
     let mut kind = parser.expect_name()?.to_string();
     let name = parser.expect_name()?;
-    let mut sizes: Vec<Expr> = Vec::new();
-    if parser.take_symbol("{") {
-        while !parser.is_symbol("}") {
-            sizes.push(parser.expression()?);
-            kind.push_str("{}");
-            if !parser.take_symbol(",") {
-                break;
-            }
-        }
-        parser.expect_symbol("}")?;
-    }
+    let sizes = if parser.take_symbol("{") { parser.expressions("}")? } else { Vec::new() };
+    kind += &"{}".repeat(sizes.len());
     let value = if parser.take_symbol(":=") { Some(parser.expression()?) } else { None };
     let is_hidden = matches!(&value, Some(Expr { kind: Kind::Name(name), .. }) if &**name == "*");
     if is_hidden {

@@ -44,9 +44,7 @@ pub(crate) fn read(texts: &mut Vec<Text>, options: &ReadOptions<'_>) -> Result<R
     let mut name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let outer: Vec<Rc<str>> =
         unit.routines.iter().filter(|(_, depth)| *depth == 0).map(|(routine, _)| routine.name.clone()).collect();
-    for (routine, _) in unit.routines {
-        machine.routines.entry(routine.name.clone()).or_insert_with(|| Rc::new(routine));
-    }
+    machine.add(unit.routines.into_iter().map(|(routine, _)| routine));
     let flow = machine.run(&unit.main)?;
     let is_called = machine.recorder.items.iter().any(|item| matches!(item, Item::Move(_)));
     let entry = match &options.entry {

@@ -6,7 +6,7 @@ use crate::common::expressions::{Parser, Syntax};
 use crate::common::lexer::{Spelling, Token, tokens};
 use crate::common::tree::{Action, Expr, Kind, Parameter, Routine, Statement};
 use crate::common::value::Value;
-use crate::common::{Fail, Result, Span, Text, fail};
+use crate::common::{Fail, Result, Span, Text, fail, without_lines};
 
 const SPELLING: Spelling = Spelling {
     comment: '#',
@@ -36,7 +36,7 @@ struct Reader {
 }
 
 pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
-    let text = without_labels(&text.text);
+    let text = without_lines(&text.text, '$');
     let parser = Parser::new(Syntax::UrScript, tokens(&text, file, &SPELLING)?);
     let mut reader = Reader { parser, unit: Unit::default(), depth: 0 };
     let main = reader.block(&[])?;
@@ -50,25 +50,7 @@ pub(super) fn parse(text: &Text, file: usize) -> Result<Unit> {
     Ok(reader.unit)
 }
 
-/// Replaces the teach pendant's own lines (`$ 3 "MoveJ"`) by blanks, so that positions do not
-/// change.
-fn without_labels(text: &str) -> String {
-    let blank = |line: &str| -> String {
-        if !line.trim_start().starts_with('$') {
-            return line.to_owned();
-        }
-        line.chars().map(|c| if c == '\n' { "\n".to_owned() } else { " ".repeat(c.len_utf8()) }).collect()
-    };
-    text.split_inclusive('\n').map(blank).collect()
-}
-
 impl Reader {
-    fn pass_line(&mut self) {
-        while !self.parser.is_over() && *self.parser.peek() != Token::Line {
-            self.parser.advance();
-        }
-    }
-
     /// Parses statements up to one of the words, which is not consumed.
     fn block(&mut self, ends: &[&str]) -> Result<Vec<Statement>> {
         let mut body = Vec::new();
@@ -112,7 +94,7 @@ impl Reader {
                     Err(Fail { message, .. }) => message,
                 };
                 self.parser.at = start;
-                self.pass_line();
+                self.parser.skip_to(&Token::Line);
                 Ok(Some(Statement { action: Action::Refused(message), span: span.to(self.parser.last_span()) }))
             }
         }
@@ -224,7 +206,7 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
             return Ok(Action::Declare { kind: "".into(), name, sizes: Vec::new(), value });
         }
         "run" | "join" | "kill" => {
-            rest(parser);
+            parser.skip_to(&Token::Line);
             return Ok(match word {
                 "run" => Action::Refused(
                     "threads are not simulated; they may move the robot or change what the program does: take the line out if it does not".into(),
@@ -254,10 +236,4 @@ fn word_action(parser: &mut Parser, action: Action) -> Action {
         parser.take_symbol(")");
     }
     action
-}
-
-fn rest(parser: &mut Parser) {
-    while *parser.peek() != Token::Line {
-        parser.advance();
-    }
 }

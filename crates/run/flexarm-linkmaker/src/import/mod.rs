@@ -49,7 +49,7 @@ use summary::Parts;
 pub use flexarm_fe_io::exchange::MatrixNames as Names;
 pub use flexarm_fem::matrix_link::PartMasses;
 pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
-pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportPart, ImportSummary, markdown, tables};
+pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportSummary, markdown, tables};
 pub use words::{FrameAt, ImportFormat, ImportMap, NodePlane, parse_inertia, parse_part, parse_split, triple};
 
 /// Warning about a modal link without its second-order terms, used here and where a robot uses such
@@ -68,8 +68,8 @@ pub struct ImportJob {
     pub files: Vec<PathBuf>,
     /// Mass file, if its role does not follow from its name.
     pub mass_file: Option<PathBuf>,
-    /// Expected format; `None`: recognised by content.
-    pub format: Option<ImportFormat>,
+    /// Expected format.
+    pub format: ImportFormat,
     /// Names of the matrices in files that hold several.
     pub names: MatrixNames,
     /// Units of the files; `None`: those of the sidecar.
@@ -95,7 +95,7 @@ impl Default for ImportJob {
         Self {
             files: Vec::new(),
             mass_file: None,
-            format: None,
+            format: ImportFormat::Auto,
             names: MatrixNames::default(),
             units: None,
             map: None,
@@ -166,17 +166,15 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
 }
 
 fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(), LinkError> {
-    match job.format {
-        Some(format) if !format.covers(found) => {
-            let what = format!(
-                "is {} according to its content, but {} gives another format: omit it",
-                found.name(),
-                Setting::MatrixFormat
-            );
-            Err(LinkError::file(origin, what))
-        }
-        _ => Ok(()),
+    if job.format.covers(found) {
+        return Ok(());
     }
+    let what = format!(
+        "is {} according to its content, but {} gives another format: omit it",
+        found.name(),
+        Setting::MatrixFormat
+    );
+    Err(LinkError::file(origin, what))
 }
 
 /// What an import needs beside the matrices, from the job or else from the files.

@@ -5,13 +5,15 @@ use std::fmt::Write as _;
 
 use flexarm_fem::matrix_link::MatrixReduction;
 use flexarm_fem::reduction::Superelement;
-use flexarm_fem::{Doubt, GateLimits, ModalLink, ReducedLink, RigidPart};
+use flexarm_fem::{Doubt, GateLimits, ModalLink, ReducedLink};
 use flexarm_settings::{Caveat, written};
-use nalgebra::{DMatrix, Matrix3, Matrix6};
+use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::SECOND_ORDER_UNKNOWN;
-use crate::reduce::{ModalFigures, ReportTable, coarse, doubted, modal_table, warning_list};
+use crate::reduce::{
+    ModalFigures, PartFigures, ReportTable, coarse, doubted, matrix_table, modal_table, rows3, rows6, warning_list,
+};
 
 /// Result of `flexarm import`.
 #[derive(Clone, Debug, Serialize)]
@@ -43,7 +45,7 @@ pub struct ImportSummary {
     /// Position of the elastic joint between the two parts.
     pub split_m: [f64; 3],
     /// The two rigid parts, proximal first.
-    pub parts: Vec<ImportPart>,
+    pub parts: Vec<PartFigures>,
     /// Natural frequencies with A held and B free (Hz); empty without a mass matrix or modes.
     pub frequencies_hz: Vec<f64>,
     /// Natural frequencies of the two rigid parts with their joint (Hz).
@@ -81,17 +83,6 @@ pub struct ImportInterface {
     pub rpy_rad: [f64; 3],
     /// Source of the frame.
     pub from: &'static str,
-}
-
-/// A rigid part.
-#[derive(Clone, Debug, Serialize)]
-pub struct ImportPart {
-    /// Mass.
-    pub mass_kg: f64,
-    /// Centre of mass.
-    pub com_m: [f64; 3],
-    /// Inertia about the centre of mass, 3×3 (kg m²).
-    pub inertia: [[f64; 3]; 3],
 }
 
 /// Results of the checks; relative unless the key has a unit.
@@ -150,8 +141,6 @@ impl ImportSummary {
         let mass_error = masses.map(|m| m.iter().map(|m| (m / whole.mass - 1.0).abs()).fold(0.0, f64::max));
         let mut all = doubts(reduction, &parts.warnings, mass_error.zip(masses));
         let modal = modal_figures(link, &mut all);
-        let list =
-            |part: &RigidPart| ImportPart { mass_kg: part.mass, com_m: part.com.into(), inertia: rows3(&part.inertia) };
         Self {
             link: link.name.clone(),
             sources: parts.files,
@@ -166,7 +155,7 @@ impl ImportSummary {
             stiffness: rows6(&link.K_BB),
             compliance: link.tip_compliance().map_or([[f64::NAN; 6]; 6], |C| rows6(&C)),
             split_m: link.split.X_LS.translation.vector.into(),
-            parts: vec![list(&link.proximal), list(&link.distal)],
+            parts: vec![PartFigures::from(&link.proximal), PartFigures::from(&link.distal)],
             frequencies_hz: held_frequencies_hz.iter().copied().take(10).collect(),
             lumped_frequencies_hz: lumped_frequencies_hz.clone(),
             fixed_interface_hz: parts.element.as_ref().map_or_else(Vec::new, Superelement::fixed_frequencies_hz),
@@ -303,15 +292,6 @@ fn check_rows(c: &ImportChecks) -> Vec<Vec<String>> {
     checks
 }
 
-fn matrix_table(title: &'static str, M: &[[f64; 6]; 6]) -> ReportTable {
-    let names = ["x", "y", "z", "rx", "ry", "rz"];
-    let row = |(row, name): (&[f64; 6], &str)| {
-        std::iter::once(name.to_owned()).chain(row.iter().map(|x| format!("{x:.6e}"))).collect()
-    };
-    let header: Vec<&str> = std::iter::once("").chain(names).collect();
-    ReportTable::new(title, &header, M.iter().zip(names).map(row).collect()).on_page()
-}
-
 /// Returns the figures as a Markdown page.
 pub fn markdown(summary: &ImportSummary) -> String {
     let mut page = format!(
@@ -329,12 +309,4 @@ pub fn markdown(summary: &ImportSummary) -> String {
     }
     page += &warning_list(&summary.warnings);
     page
-}
-
-fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    M.transpose().into()
-}
-
-fn rows6(M: &Matrix6<f64>) -> [[f64; 6]; 6] {
-    M.transpose().into()
 }

@@ -6,6 +6,7 @@ use std::str::FromStr;
 
 use flexarm_fe_io::exchange::{InterfaceMap, MatrixFormat};
 use flexarm_fem::{RigidPart, SplitAt};
+use flexarm_settings::Words;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::WordError;
@@ -133,8 +134,11 @@ impl FromStr for FrameAt {
 }
 
 /// File format as given by the user.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ImportFormat {
+    /// Any, by content.
+    #[default]
+    Auto,
     /// Matrix Market.
     MatrixMarket,
     /// `*USER ELEMENT` of CalculiX and Abaqus.
@@ -155,10 +159,26 @@ pub enum ImportFormat {
     Sid,
 }
 
+impl Words for ImportFormat {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("auto", Self::Auto, "By content"),
+        ("matrix-market", Self::MatrixMarket, "Matrix Market"),
+        ("user-element", Self::UserElement, "CalculiX, Abaqus"),
+        ("abaqus-text", Self::AbaqusText, "node,dof,node,dof,value"),
+        ("coordinate", Self::Coordinate, "row column value (Abaqus COORDINATE, CalculiX .sti)"),
+        ("dmig", Self::Dmig, "Nastran"),
+        ("op4", Self::Op4, "Nastran"),
+        ("harwell-boeing", Self::HarwellBoeing, "Harwell-Boeing"),
+        ("simscape", Self::Simscape, "Comma-separated values"),
+        ("sid", Self::Sid, "Modal body"),
+    ];
+}
+
 impl ImportFormat {
     /// Whether a file recognised as `found` has this format.
     pub(super) fn covers(self, found: MatrixFormat) -> bool {
         match self {
+            Self::Auto => true,
             Self::MatrixMarket => found == MatrixFormat::MatrixMarket,
             Self::UserElement => found == MatrixFormat::UserElement,
             Self::AbaqusText => found == MatrixFormat::LabelledText,

@@ -51,13 +51,13 @@ pub use flexarm_fem::reduction::Tie;
 pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
 pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
 pub use listing::{MeshListing, RegionListing, SetListing};
-pub(crate) use report::warning_list;
 pub use report::{ReportTable, headline, markdown, modal_table, tables};
+pub(crate) use report::{matrix_table, warning_list};
 pub use summary::{
     ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModalFigures, ModeFigures, PartFigures,
     PhaseFigures, ReduceFiles, ReduceSummary, RegionFigures, SolverFigures,
 };
-pub(crate) use summary::{coarse, doubted};
+pub(crate) use summary::{coarse, doubted, rows3, rows6};
 pub use urdf_link::{LinkJoint, UrdfLink};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
 pub(crate) use words::{MATERIAL_FORMS, SPLIT_FORMS};

@@ -9,7 +9,7 @@ use flexarm_fem::model::AssemblyOptions;
 use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
 use flexarm_fem::sparse::{ModesWanted, Ordering};
 use flexarm_fem::{Doubt, GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
-use flexarm_settings::Setting;
+use flexarm_settings::{Setting, Words};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -303,10 +303,7 @@ fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, LinkError>
 }
 
 pub(super) fn quadrature_name(job: &ReduceJob) -> &'static str {
-    match job.quadrature.unwrap_or_default() {
-        QuadratureChoice::Exact => "exact",
-        QuadratureChoice::Calculix => "calculix",
-    }
+    job.quadrature.unwrap_or_default().word().unwrap_or_default()
 }
 
 /// Adds the number and the position of the node in the file to an error.

@@ -45,8 +45,8 @@ const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 /// Returns all tables of a reduction, in the order of interest.
 pub fn tables(summary: &ReduceSummary) -> Vec<ReportTable> {
     let mut tables = vec![interfaces(summary), mass(summary), softness(summary)];
-    tables.push(matrix("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness));
-    tables.push(matrix("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance));
+    tables.push(matrix_table("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness));
+    tables.push(matrix_table("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance));
     tables.extend([checks(summary), frequencies(summary)]);
     if !summary.fixed_interface_hz.is_empty() {
         tables.push(kept(summary));
@@ -180,7 +180,7 @@ fn softness(summary: &ReduceSummary) -> ReportTable {
     ReportTable::new("deflection of B along the load, A held", &["", "x", "y", "z", ""], rows)
 }
 
-fn matrix(title: &'static str, M: &[[f64; 6]; 6]) -> ReportTable {
+pub(crate) fn matrix_table(title: &'static str, M: &[[f64; 6]; 6]) -> ReportTable {
     let rows = M
         .iter()
         .zip(COMPONENTS)

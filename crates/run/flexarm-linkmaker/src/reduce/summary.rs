@@ -518,10 +518,10 @@ pub(crate) fn doubted(link: &str, doubt: Doubt) -> Caveat {
     }
 }
 
-fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {
+pub(crate) fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {
     M.transpose().into()
 }
 
-fn rows6(M: &Matrix6<f64>) -> [[f64; 6]; 6] {
+pub(crate) fn rows6(M: &Matrix6<f64>) -> [[f64; 6]; 6] {
     M.transpose().into()
 }

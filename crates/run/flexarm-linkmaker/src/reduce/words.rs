@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use flexarm_fem::Material;
+use flexarm_settings::Words;
 use serde::de::{Error as _, SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -188,6 +189,13 @@ pub enum QuadratureChoice {
     Calculix,
 }
 
+impl Words for QuadratureChoice {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("exact", Self::Exact, "Sufficient points for stiffness and mass [default]"),
+        ("calculix", Self::Calculix, "The points of CalculiX, for comparison with it"),
+    ];
+}
+
 /// Elimination ordering of the unknowns.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -199,6 +207,14 @@ pub enum OrderingChoice {
     Amd,
     /// Nested dissection.
     Nested,
+}
+
+impl Words for OrderingChoice {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("auto", Self::Auto, "By size [default]"),
+        ("amd", Self::Amd, "Approximate minimum degree"),
+        ("nested", Self::Nested, "Nested dissection"),
+    ];
 }
 
 /// A position derived from the mesh.

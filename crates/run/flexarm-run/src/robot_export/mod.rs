@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use flexarm_kinematics::{ElasticAngles, JointMotion};
+use flexarm_settings::Words;
 use serde::Serialize;
 use serde_json::json;
 
@@ -29,6 +30,13 @@ pub enum RobotFormat {
     Mjcf,
     /// URDF: elastic coordinates are joints without springs, which are in a JSON file.
     Urdf,
+}
+
+impl Words for RobotFormat {
+    const WORDS: &'static [(&'static str, Self, &'static str)] = &[
+        ("mjcf", Self::Mjcf, "MuJoCo: springs as joint stiffness and tendons"),
+        ("urdf", Self::Urdf, "A joint per elastic coordinate, with springs.json; Pinocchio, Drake"),
+    ];
 }
 
 /// Files of an exported arm.

@@ -3,11 +3,31 @@
 use std::rc::Rc;
 
 use super::{Dialect, Flow, Machine, Variable, Variables};
-use crate::common::tree::{Argument, Expr, Kind, Routine};
+use crate::common::tree::{Action, Argument, Expr, Kind, Routine, Statement};
 use crate::common::value::Value;
 use crate::common::{Result, Span, fail};
 
 impl<D: Dialect> Machine<'_, D> {
+    /// Adds routines; of several with one name the first counts.
+    pub(crate) fn add(&mut self, routines: impl IntoIterator<Item = Routine>) {
+        for routine in routines {
+            self.routines.entry(routine.name.clone()).or_insert_with(|| Rc::new(routine));
+        }
+    }
+
+    /// Runs declarations; an unreadable one is an error only where its name is used.
+    pub(crate) fn declare_all(&mut self, data: &[Statement]) {
+        for statement in data {
+            if let Err(fail) = self.run(std::slice::from_ref(statement))
+                && let Action::Declare { name, .. } = &statement.action
+            {
+                let line = self.recorder.line(statement.span);
+                let what = format!("`{name}`, whose declaration in line {line} cannot be read ({})", fail.message);
+                self.set_global(name, Value::Outside(what.into()));
+            }
+        }
+    }
+
     pub(super) fn call(&mut self, name: &Rc<str>, arguments: &[Argument], span: Span) -> Result<Flow> {
         let Some(routine) = self.routines.get(name).cloned() else {
             return D::instruction(self, name, arguments, span);
