@@ -34,7 +34,7 @@ TABLES, ROBOTS = ROOT / "tests/arms", ROOT / "robots"
 MARK = "# Written by tools/make_arms.py from the maker's files.\n"
 SECTIONS = {"casting": 3.5, "box": 7.0}  # powers of the superellipse
 EDGE = 0.1  # chamfer of a drum over its radius
-CUT, TURN = 0.45, 30.0  # of each side of a corner of a pipe; degrees from ring to ring
+CUT, TURN = 0.45, 30.0  # of each side of a corner of a pipe, at most; degrees from ring to ring
 STEP = 0.2  # m, at most from ring to ring: a link that bends is drawn smoothly
 POSES = 32  # of the set in which the worst is looked for
 DENSITY = 2700.0  # kg/m³, aluminium: the cube that stands for the payload
@@ -173,10 +173,10 @@ def mixed(a, b, at):
 
 
 def bent(rows):
-    """Returns rows of a pipe, its corners replaced by parabolas."""
+    """Returns rows of a pipe with parabolas for its corners, which begin at most a radius before them."""
     line = rows[:1]
     for a, b, c in zip(rows, rows[1:], rows[2:]):
-        low, high = mixed(b, a, CUT), mixed(b, c, CUT)
+        low, high = (mixed(b, end, min(CUT, b[3] / math.dist(b[:3], end[:3]))) for end in (a, c))
         turn = math.degrees(math.acos(min(1.0, dot(unit(difference(b, a)), unit(difference(c, b))))))
         steps = math.ceil(turn / TURN) or 1
         line += [mixed(mixed(low, b, k / steps), mixed(b, high, k / steps), k / steps) for k in range(steps + 1)]
