@@ -397,7 +397,7 @@ mod check {
         assert_eq!(findings(&place, &["robot.toml"], 2).len(), 5);
         let answer = place.flexarm(&["check", "beam.urdf"]);
         assert_eq!(answer.code, 2);
-        for word in ["error[zero-axis] beam.urdf:7", "help: ", "5 errors, 0 warnings"] {
+        for word in ["error[zero-axis] beam.urdf:7:", "help: ", "5 errors, 0 warnings"] {
             assert!(answer.out.contains(word), "{word}: {}", answer.out);
         }
     }

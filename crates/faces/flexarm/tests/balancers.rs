@@ -182,6 +182,6 @@ fn a_pose_without_room_for_the_gas_is_refused() {
 #[test]
 fn the_kr300_as_shipped_has_no_warnings() {
     let findings = check(&project("robots/kr300/robot.toml"), None, &LoadOptions::default());
-    let loud: Vec<_> = findings.iter().filter(|f| f.severity != "note").collect();
+    let loud: Vec<_> = findings.iter().filter(|f| f.severity != flexarm::Severity::Note).collect();
     assert!(loud.is_empty(), "{loud:#?}");
 }

@@ -139,8 +139,8 @@ fn codes(made: &NewRobot) -> Vec<String> {
     assert!(motion.violations.is_empty(), "{:?}", motion.violations);
     assert!(made.joints.iter().all(|joint| motion.trajectory.joints().contains(&joint.name)));
     let findings = check(Path::new(&made.robot), None, &flexarm::LoadOptions::default());
-    let bad: Vec<_> = findings.into_iter().filter(|f| f.severity != "note").collect();
-    assert!(bad.iter().all(|f| f.severity != "error"), "{bad:?}");
+    let bad: Vec<_> = findings.into_iter().filter(|f| f.severity != flexarm::Severity::Note).collect();
+    assert!(bad.iter().all(|f| !f.is_error()), "{bad:?}");
     bad.into_iter().map(|f| f.code).collect()
 }
 

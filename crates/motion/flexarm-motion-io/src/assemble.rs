@@ -1,7 +1,7 @@
 //! Builds curves from the messages of a topic: choice of the clock, removal of unusable samples,
 //! choice of velocities.
 
-use flexarm_settings::Caveat;
+use flexarm_settings::Finding;
 use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError, velocity_mismatch};
 
 use crate::collect::{Received, Series, Topic};
@@ -38,7 +38,7 @@ struct Line {
 pub(crate) struct Assembled {
     pub(crate) trajectory: Trajectory,
     pub(crate) samples: usize,
-    pub(crate) caveats: Vec<Caveat>,
+    pub(crate) caveats: Vec<Finding>,
 }
 
 /// Builds the curves of a topic.
@@ -69,16 +69,16 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
 /// Collects caveats about one file.
 struct FileCaveats<'a> {
     file: &'a str,
-    caveats: Vec<Caveat>,
+    caveats: Vec<Finding>,
 }
 
 impl FileCaveats<'_> {
     fn warn(&mut self, code: &str, message: &str, help: &str) {
-        self.caveats.push(Caveat::from_message(code, self.file, format!("{}: {message}", self.file), help));
+        self.caveats.push(Finding::warning(code, self.file, format!("{}: {message}", self.file), help));
     }
 
     fn note(&mut self, code: &str, message: &str) {
-        self.caveats.push(Caveat::from_message(code, self.file, format!("{}: {message}", self.file), "").as_note());
+        self.caveats.push(Finding::warning(code, self.file, format!("{}: {message}", self.file), "").as_note());
     }
 }
 

@@ -5,7 +5,7 @@ use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 use flexarm_files::most_unpacked;
-use flexarm_settings::Caveat;
+use flexarm_settings::Finding;
 
 use crate::assemble::assemble;
 use crate::collect::Collector;
@@ -172,10 +172,10 @@ fn finish(
         _ => trouble,
     };
     let (topic, others) = collector.choose().map_err(|trouble| cut(trouble).of(shown))?;
-    let mut caveats: Vec<Caveat> = Vec::new();
+    let mut caveats: Vec<Finding> = Vec::new();
     for (file, why) in broken {
         let message = format!("{file}: {why}; it is read up to there ({} messages on {})", topic.count, topic.name);
-        caveats.push(Caveat::from_message("motion-cut", file, message, "recover it, or record it again"));
+        caveats.push(Finding::warning("motion-cut", file, message, "recover it, or record it again"));
     }
     if !was_asked {
         caveats.push(chosen(&topic.described(), &others, shown));
@@ -188,17 +188,17 @@ fn finish(
     Ok(MessageMotion { trajectory, format, topic: Some(name), message, samples, dropped, caveats })
 }
 
-/// Caveat about the selected topic; a warning if there was a choice.
-fn chosen(taken: &str, others: &[String], shown: &str) -> Caveat {
+/// Finding about the selected topic; a warning if there was a choice.
+fn chosen(taken: &str, others: &[String], shown: &str) -> Finding {
     use flexarm_settings::Setting;
     if others.is_empty() {
         let message = format!("{shown}: the motion is that of {taken}, the only topic that has one");
-        return Caveat::from_message("motion-topic", shown, message, "").as_note();
+        return Finding::warning("motion-topic", shown, message, "").as_note();
     }
     let message = format!(
         "{shown}: the motion is that of {taken}; others have one too: {}; {} chooses",
         others.join(", "),
         Setting::Topic
     );
-    Caveat::from_message("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
+    Finding::warning("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
 }

@@ -62,7 +62,7 @@ pub mod internals {
     pub use crate::definition::{Definitions, Kind, Many};
 }
 
-use flexarm_settings::Caveat;
+use flexarm_settings::Finding;
 use flexarm_trajectory::Trajectory;
 
 /// Selection of the joints and the topic of a file.
@@ -91,5 +91,5 @@ pub struct MessageMotion {
     /// Joints of the messages that were not requested.
     pub dropped: Vec<String>,
     /// Choices, assumptions and dropped content.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }

@@ -1,6 +1,6 @@
 //! Messages as text: one document, or several as printed by `ros2 topic echo`.
 
-use flexarm_settings::Caveat;
+use flexarm_settings::Finding;
 
 use crate::assemble::assemble;
 use crate::collect::Collector;
@@ -87,7 +87,7 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
         }
         let message =
             format!("{origin}: the last of {documents} documents is not whole and is left out ({})", trouble.problem);
-        caveats.push(Caveat::from_message("motion-cut", origin, message, ""));
+        caveats.push(Finding::warning("motion-cut", origin, message, ""));
     }
     if !collector.topics[topic].has_something() {
         return Err(PlacedProblem::new(Problem::NoMessage { found: keys }));

@@ -36,7 +36,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use flexarm_run::caveat::of_use;
-use flexarm_run::{Caveat, Error, Modelling, Motion, Robot, ValueError, caveat};
+use flexarm_run::{Error, Finding, Modelling, Motion, Robot, ValueError, caveat};
 
 pub use crate::milling::ChatterError;
 pub use caveats::tool_caveats;
@@ -107,7 +107,7 @@ pub struct Lobes {
     /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
     /// Caveats about the input and the validity of the result.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Stability limit.

@@ -46,7 +46,7 @@ use serde::Serialize;
 pub use error::CompensateError;
 use files::Files;
 use flexarm_run::caveat::{Use, once_each, warnings};
-use flexarm_run::{Arm, Caveat, Error, Modelling, Motion, MotionViolation, Robot, RunOptions, Scenario};
+use flexarm_run::{Arm, Error, Finding, Modelling, Motion, MotionViolation, Robot, RunOptions, Scenario};
 use job::Job;
 use judge::{Judge, sweep};
 pub use limits::LimitRule;
@@ -205,7 +205,7 @@ pub struct Compensation {
     /// Messages of the caveats.
     pub warnings: Vec<String>,
     /// Caveats.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// The commands, for callers in the same process.
     #[serde(skip)]
     pub trajectory: Arc<Trajectory>,

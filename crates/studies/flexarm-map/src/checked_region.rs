@@ -2,7 +2,7 @@
 
 use flexarm_kinematics::{Data, Model, forward_kinematics};
 use flexarm_run::robot::tcp_frame;
-use flexarm_run::{Caveat, Error, Robot, ValueError};
+use flexarm_run::{Error, Finding, Robot, ValueError};
 use flexarm_settings::Quantity;
 use nalgebra::{DVector, Rotation3};
 
@@ -52,7 +52,7 @@ pub(super) fn region_of<'m>(
     model: &'m Model,
     near: &[f64],
     rotations: &[Rotation3<f64>],
-) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+) -> Result<(Region<'m>, Vec<Finding>), Error> {
     if let Some(edges) = request.workpiece_m {
         if !edges.iter().all(|edge| edge.is_finite() && *edge >= 0.0) {
             return Err(MapError::Workpiece { found: edges }.into());
@@ -89,7 +89,7 @@ fn grid_region<'m>(
     model: &'m Model,
     near: &[f64],
     directions: usize,
-) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+) -> Result<(Region<'m>, Vec<Finding>), Error> {
     let found = match (workspace.keep_out_m, workspace.bounds) {
         (Some(radius), _) => radius,
         (None, Some(_)) => 0.0,
@@ -107,7 +107,7 @@ fn grid_region<'m>(
     if !finder.is_closed() {
         let message = "the arm has no closed-form inverse kinematics: poses are found by search, which is \
                        slow and may miss branches, and places near the workspace boundary";
-        caveats.push(Caveat::from_message("searched-poses", "map", message, "map the arm over joint values"));
+        caveats.push(Finding::warning("searched-poses", "map", message, "map the arm over joint values"));
     }
     let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
     let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
@@ -122,7 +122,11 @@ fn grid_region<'m>(
 }
 
 /// Returns the product of the joint values, the first joint varying fastest.
-fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+fn joint_region<'m>(
+    ranges: &'m [JointRange],
+    model: &Model,
+    near: &[f64],
+) -> Result<(Region<'m>, Vec<Finding>), Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     if ranges.is_empty() {
         return Err(MapError::NoJoints.into());
@@ -145,7 +149,7 @@ fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Re
         if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
             let (lower, upper) = (limits.lower, limits.upper);
             let message = format!("the map moves joint {joint:?} beyond its limits {lower} to {upper}");
-            caveats.push(Caveat::from_message("outside-limits", joint, message, "reduce the range of the joint"));
+            caveats.push(Finding::warning("outside-limits", joint, message, "reduce the range of the joint"));
         }
         numbers.push(k);
         poses *= *points as f64;

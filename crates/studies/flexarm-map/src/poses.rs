@@ -14,7 +14,7 @@ use super::region::MAX_PLACES;
 use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
-use flexarm_run::{Caveat, Error, Robot};
+use flexarm_run::{Error, Finding, Robot};
 
 /// A list of poses as written in TOML.
 #[derive(Debug, Deserialize)]
@@ -145,7 +145,7 @@ fn some(poses: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseListError> {
 }
 
 /// Checks the poses and returns them as a region.
-pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region<'m>, Vec<Finding>), Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
     if !(1..=MAX_PLACES).contains(&poses.len()) {
@@ -158,7 +158,7 @@ pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region
         if count > 0 {
             let (lower, upper) = (c.limits.lower, c.limits.upper);
             let message = format!("{count} poses have joint {:?} beyond its limits {lower} to {upper}", c.joint);
-            caveats.push(Caveat::from_message("outside-limits", &c.joint, message, "check the units of the list"));
+            caveats.push(Finding::warning("outside-limits", &c.joint, message, "check the units of the list"));
         }
     }
     for pose in poses {

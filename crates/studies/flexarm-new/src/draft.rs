@@ -160,15 +160,10 @@ fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), 
         Ok(urdf) => return Ok((urdf, Vec::new())),
         Err(error) => error,
     };
-    let UrdfError::Invalid { issues } = &error else { return Err(error.into()) };
-    let waived: Option<Vec<String>> = issues
-        .iter()
-        .map(|issue| match &issue.problem {
-            flexarm_urdf::Problem::TriangleInequality { link, .. } => Some(link.clone()),
-            _ => None,
-        })
-        .collect();
-    let Some(waived) = waived else { return Err(error.into()) };
+    let waived = match &error {
+        UrdfError::Invalid { issues, waivable } if issues.len() == waivable.len() => waivable.clone(),
+        _ => return Err(error.into()),
+    };
     let mut again = options.clone();
     again.waive.extend(waived.iter().cloned());
     Ok((read_urdf(path, &again)?, waived))

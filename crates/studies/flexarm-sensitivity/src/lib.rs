@@ -36,7 +36,7 @@ use serde::Serialize;
 use flexarm_identify::parameters::{asks_for, fits};
 use flexarm_run::caveat::{Use, once_each, warnings};
 use flexarm_run::prepare::{loaded, runnable};
-use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, RunOptions, Scenario, ValueError};
+use flexarm_run::{Arm, Error, Finding, Modelling, Robot, RunOptions, Scenario, ValueError};
 
 use controllers::{add_controllers, limited};
 use slopes::Repeated;
@@ -91,7 +91,7 @@ pub struct Sensitivity {
     /// Messages of the caveats.
     pub warnings: Vec<String>,
     /// Caveats.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Effect of a change of one parameter on the error.
@@ -153,7 +153,7 @@ fn slopes_and_caveats(
     options: &RunOptions,
     parameters: &[RunParameter],
     keep_samples: bool,
-) -> Result<(RunSlopes, Vec<Caveat>), Error> {
+) -> Result<(RunSlopes, Vec<Finding>), Error> {
     let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
         let name = options.stepper.name();
         let text = format!("derivatives of a run need the stepper generalised-alpha, found {name}: use the default");

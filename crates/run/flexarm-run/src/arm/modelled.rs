@@ -15,7 +15,7 @@ use nalgebra::DMatrix;
 use crate::arm::bends::bends;
 use crate::arm::options::{DriveModel, LinkModel, Modelling};
 use crate::arm::{Arm, Owner};
-use crate::caveat::Caveat;
+use crate::caveat::Finding;
 use crate::caveat::kinds;
 use crate::caveat::lumping;
 use crate::caveat::size::Size;
@@ -259,12 +259,12 @@ impl Robot {
 #[derive(Default)]
 struct ChosenLinks {
     links: Vec<FlexibleLink>,
-    doubts: Vec<Caveat>,
+    doubts: Vec<Finding>,
     modal_instead: Vec<String>,
 }
 
 /// Returns the caveats about a link in this form.
-fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Caveat> {
+fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Finding> {
     let mut doubts = Vec::new();
     let is_modal = matches!(form, LinkForm::Modal(_));
     if is_modal && link.stress == Some(StressSource::Beam) {
@@ -274,11 +274,11 @@ fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Caveat> {
     if matches!(form, LinkForm::Modal(modal) if !modal.has_second_order()) {
         let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.link);
         let help = "reduce the mesh itself (flexarm reduce) to have them";
-        doubts.push(Caveat::from_message("second-order-unknown", "links", text, help));
+        doubts.push(Finding::warning("second-order-unknown", "links", text, help));
     }
     if matches!(form, LinkForm::Chain(_)) && link.angles == ElasticAngles::EulerZyx {
         let text = format!("link {:?}: {EULER_CHAIN}", link.link);
-        doubts.push(Caveat::from_message("euler-chain", "links", text, "leave angles away: rotation vectors"));
+        doubts.push(Finding::warning("euler-chain", "links", text, "leave angles away: rotation vectors"));
     }
     doubts
 }

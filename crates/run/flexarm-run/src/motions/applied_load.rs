@@ -4,7 +4,7 @@ use flexarm_kinematics::{Frame, Model, Wrench};
 use flexarm_settings::Quantity;
 use flexarm_stepping::{Load, TimedWrench};
 
-use crate::caveat::Caveat;
+use crate::caveat::Finding;
 use crate::error::{Error, LoadError};
 use crate::motions::loads_file::LoadLocation;
 use crate::robot::TCP_FRAME;
@@ -19,7 +19,7 @@ pub struct AppliedLoad {
     /// Start time (s), if there is one.
     pub start_s: Option<f64>,
     /// Caveats about the load as written.
-    pub(crate) doubts: Vec<Caveat>,
+    pub(crate) doubts: Vec<Finding>,
     /// Location in the file, if read from one.
     pub(crate) written: Option<LoadLocation>,
 }

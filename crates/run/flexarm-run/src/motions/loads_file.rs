@@ -18,7 +18,7 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Finding};
 use crate::error::{Error, LoadError};
 use crate::motions::applied_load::AppliedLoad;
 use crate::motions::load_jumps::jumps_of;
@@ -200,7 +200,7 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
 
 /// Caveats about angles that look like degrees: the phase of a sine, arguments of sin and cos in
 /// expressions.
-fn doubts(e: &LoadEntry) -> Vec<Caveat> {
+fn doubts(e: &LoadEntry) -> Vec<Finding> {
     let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
     caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
 }

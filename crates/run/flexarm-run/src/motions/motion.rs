@@ -7,7 +7,7 @@ use flexarm_kinematics::{Coordinate, Model};
 use flexarm_stepping::PrescribedMotion;
 use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory, foreign_joints};
 
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Finding};
 use crate::error::{Error, PoseError, ValueError};
 use crate::motions::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent};
 use crate::motions::tool_path::{Cell, ToolPath};
@@ -41,7 +41,7 @@ pub struct Motion {
     /// Joints in the file that the robot does not have; they are ignored.
     pub dropped: Vec<String>,
     /// Choices, assumptions and omissions made when reading the file.
-    pub notes: Vec<Caveat>,
+    pub notes: Vec<Finding>,
 }
 
 /// Joint that the motion does not contain.
@@ -243,30 +243,30 @@ impl Motion {
     }
 
     /// Returns the caveats about the motion.
-    pub fn caveats(&self) -> Vec<Caveat> {
+    pub fn caveats(&self) -> Vec<Finding> {
         let file = self.path.display().to_string();
-        let told = self.warnings.iter().map(|text| Caveat::from_message("trajectory", &file, text, ""));
+        let told = self.warnings.iter().map(|text| Finding::warning("trajectory", &file, text, ""));
         self.notes.iter().cloned().chain(self.dropped_caveat()).chain(told).chain(self.held_note()).collect()
     }
 
-    fn dropped_caveat(&self) -> Option<Caveat> {
+    fn dropped_caveat(&self) -> Option<Finding> {
         let file = self.path.display().to_string();
         let names: Vec<String> = self.dropped.iter().map(|name| format!("{name:?}")).collect();
         let message = format!("{file}: joints that the robot does not have are left out: {}", names.join(", "));
         let help = "a gripper is one; a joint of the arm is not";
-        (!names.is_empty()).then(|| Caveat::from_message("motion-dropped-joints", &file, message, help))
+        (!names.is_empty()).then(|| Finding::warning("motion-dropped-joints", &file, message, help))
     }
 
     /// Caveats about held joints: a note for positions given in the robot file, a warning for
     /// assumed ones.
-    fn held_note(&self) -> Vec<Caveat> {
+    fn held_note(&self) -> Vec<Finding> {
         let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
         let file = self.path.display().to_string();
         let note = |held: &[&HeldJoint], end: &str| {
             let places: Vec<String> = held.iter().map(|held| format!("{:?} at {}", held.joint, held.at)).collect();
             let places = places.join(", ");
             let message = format!("{file}: joints that the motion does not name are held: {places}{end}");
-            Caveat::from_message("held-joints", &file, message, "name them in the motion to move them")
+            Finding::warning("held-joints", &file, message, "name them in the motion to move them")
         };
         let assumed =
             (!assumed.is_empty()).then(|| note(&assumed, " ([hold] in the robot file says where, in rad or m)"));

@@ -15,7 +15,7 @@ use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::{self, Caveat, kinds};
+use crate::caveat::{self, Finding, kinds};
 use crate::error::{ChannelError, Error, ValueError};
 use crate::poses::modes::{linear_error, modes_of, tool_map};
 use crate::poses::posed::Posed;
@@ -102,7 +102,7 @@ pub struct Response {
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
     /// Probable errors in the input, and limits of the result's validity.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Response of one output to one input.

@@ -8,7 +8,7 @@ use flexarm_stepping::{Load, Plant, StepError, StepRule, Stepper, new_stepper};
 use crate::arm::Arm;
 use crate::arm::options::RunOptions;
 use crate::caveat::size::Size;
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Finding};
 use crate::error::{Error, ValueError};
 use crate::motions::loads_file::EXPRESSION_PERIOD;
 use crate::motions::motion::Motion;
@@ -22,7 +22,7 @@ use crate::run::magnification::Expected;
 pub(crate) struct Checked {
     pub(crate) plant: Arc<Plant>,
     pub(crate) stepper: Box<dyn Stepper>,
-    pub(crate) load_caveats: Vec<Caveat>,
+    pub(crate) load_caveats: Vec<Finding>,
 }
 
 impl Arm {
@@ -31,7 +31,7 @@ impl Arm {
     ///
     /// # Errors
     /// All errors in the input that can be found before a stepper is built.
-    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(Plant, Vec<Caveat>), Error> {
+    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(Plant, Vec<Finding>), Error> {
         let motion = &scenario.motion;
         runnable(motion, options)?;
         loops::along_motion(&self.rigid, &motion.trajectory)?;
@@ -77,7 +77,7 @@ pub fn loaded(
     scenario: &Scenario,
     options: &RunOptions,
     mut plant: Plant,
-) -> Result<(Plant, Vec<Caveat>), Error> {
+) -> Result<(Plant, Vec<Finding>), Error> {
     let failed = |source: StepError| Error::Step { source, partial: false };
     let mut load_caveats = Vec::new();
     if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
@@ -144,7 +144,7 @@ fn stop_within(load: &mut Load, h: f64) {
 }
 
 /// Caveats about loads whose period the step size does not resolve.
-fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
+fn fast_loads(loads: &[Load], h: f64) -> Vec<Finding> {
     let fast = |load: &Load| {
         let period = load.wrench.period;
         let steps = period / h;
@@ -155,6 +155,6 @@ fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
         })
     };
     let caveat =
-        |text: String| Caveat::from_message("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
+        |text: String| Finding::warning("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
     loads.iter().filter_map(|load| fast(load).map(caveat)).collect()
 }
