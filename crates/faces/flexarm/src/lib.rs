@@ -215,10 +215,7 @@ pub mod errors {
     pub use flexarm_motion_io::MotionError;
     pub use flexarm_new::NewError;
     pub use flexarm_path::PathError;
-    pub use flexarm_run::{
-        BalancerError, ChannelError, LinkFormError, LoadError, LoopError, ModellingError, PayloadError, PoseError,
-        RecordingError, RobotFileError, StudyError, ValueError,
-    };
+    pub use flexarm_run::{LoopError, RecordingError, RobotFileError};
     pub use flexarm_stepping::StepError;
     pub use flexarm_trajectory::{ColumnMapError, TrajectoryError};
 }

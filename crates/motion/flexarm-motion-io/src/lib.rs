@@ -49,7 +49,7 @@ mod value;
 mod write;
 mod yaml;
 
-pub use error::{FilePosition, MotionError, Problem};
+pub use error::MotionError;
 pub use folder::{SQLITE_MAGIC, read_db3, read_folder, read_mcap, read_packed};
 pub use mcap::MCAP_MAGIC;
 pub use text::{looks_like_messages, read_text};

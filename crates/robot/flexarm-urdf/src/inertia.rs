@@ -219,8 +219,8 @@ fn check_body<'r>(
             return None;
         }
         let help = format!(
-            "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in the \
-             robot file): without them the link needs no force to move, and nothing bends under it",
+            "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in \
+             the robot file): without them the link needs no force to move, and nothing bends under it",
             Setting::InertiaFromDensity,
             Setting::InertiaFromTotalMass
         );

@@ -171,7 +171,7 @@ fn load_text(path: &Path) -> Result<String, UrdfError> {
     }
     // Devices and pipes are refused, since a read may never end.
     if !meta.is_file() {
-        return Err(io_error(std::io::Error::other("this is not a file")));
+        return Err(io_error(std::io::Error::other("this is not a file; give the path of a regular one")));
     }
     if meta.len() > LARGEST {
         let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());

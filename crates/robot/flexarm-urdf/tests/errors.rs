@@ -62,7 +62,10 @@ fn unreadable_files_say_so() {
     let missing = folder.0.join("missing.urdf");
     assert!(matches!(read_urdf(&missing, &ReadOptions::default()), Err(UrdfError::Io { .. })));
     assert!(matches!(read_urdf(&folder, &ReadOptions::default()), Err(UrdfError::Io { .. })));
-    assert_eq!(check_urdf(&missing, &ReadOptions::default())[0].code, "unreadable");
+    let finding = &check_urdf(&missing, &ReadOptions::default())[0];
+    assert_eq!((&*finding.code, &*finding.help), ("unreadable", "correct the path"));
+    let error = read_urdf(&missing, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(error.ends_with("help: correct the path"), "{error}");
 }
 
 #[test]

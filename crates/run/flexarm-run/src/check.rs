@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_trajectory::{FileError, PlanError, Problem, TrajectoryError};
+use flexarm_trajectory::{MISSING_LIMIT, TrajectoryError};
 use nalgebra::Vector6;
 
 use crate::arm::options::Modelling;
@@ -124,8 +124,7 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
 fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let cause = motion_formats::read(&file).err()?;
-    let missed = |file: &FileError| matches!(file.problem, Problem::Plan(PlanError::MissingLimit { .. }));
-    let follows = matches!(&cause, Error::Trajectory(TrajectoryError::File(file)) if missed(file));
+    let follows = matches!(&cause, Error::Trajectory(TrajectoryError::File(file)) if file.code == MISSING_LIMIT);
     (!follows).then(|| error("trajectory", path.display().to_string(), &cause))
 }
 

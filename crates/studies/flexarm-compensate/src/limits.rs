@@ -120,8 +120,16 @@ fn slower(limit: &MotionViolation) -> f64 {
 }
 
 fn refused(worse: &[MotionViolation], rule: LimitRule) -> CompensateError {
-    CompensateError::Limits {
-        limits: worse.iter().map(|limit| limit.message.clone()).collect(),
-        slower: rule == LimitRule::Slow,
-    }
+    let limits: Vec<&str> = worse.iter().map(|limit| &*limit.message).collect();
+    let limits = limits.join("; ");
+    let remedy = match rule == LimitRule::Slow {
+        true => {
+            "a slower motion does not help, or loads fix its timing: change the motion there, or accept the \
+             violation (`limits` = tell)"
+        }
+        false => "slow the motion down (`limits` = slow), or accept the violation (tell)",
+    };
+    CompensateError::Input(format!(
+        "the new commands exceed limits that the original motion satisfies: {limits}; {remedy}"
+    ))
 }

@@ -378,10 +378,26 @@ fn summed_up(
 /// Returns the reason why no pose can be compared with others.
 fn nothing_found(request: &MapRequest, table: &MapTable, taken: &Evaluation, by: usize, places: usize) -> MapError {
     match (&request.region, &taken.first_failure) {
-        _ if table.rows() > 0 => MapError::NothingToCompare { by: table.columns[by].name.clone() },
-        (_, Some(first)) => MapError::NoEquilibrium { poses: taken.poses, first: first.clone() },
-        (MapRegion::Workspace(w), None) => MapError::OutOfReach { places, axis: w.tool.axis },
-        (_, None) => MapError::Instants,
+        _ if table.rows() > 0 => {
+            let by = &table.columns[by].name;
+            let why = match by == "depth_m" {
+                true => ", because the feed of the tool is along its axis (feed = [...] in [tool])",
+                false => "",
+            };
+            MapError::Input(format!("none of the poses has a {by}{why}: compare by another quantity"))
+        }
+        (_, Some(first)) => MapError::Input(format!(
+            "none of the {poses} poses has an equilibrium; at the first: {first}",
+            poses = taken.poses
+        )),
+        (MapRegion::Workspace(w), None) => MapError::Input(format!(
+            "none of the {places} places is within reach with the tool pointing along {axis:?} (world) and all \
+             joints within their limits: try other values for {} or {}",
+            Setting::Bounds,
+            Setting::ToolAxis,
+            axis = w.tool.axis
+        )),
+        (_, None) => MapError::instants(),
     }
 }
 

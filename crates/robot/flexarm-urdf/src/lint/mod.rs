@@ -362,8 +362,8 @@ impl Lint<'_, '_> {
 fn instead_of_joint(kind: &str) -> &'static str {
     match kind {
         "floating" => {
-            "the base is fixed here: make the joint fixed, or replace it by three prismatic and three revolute joints \
-             in series"
+            "the base is fixed here: make the joint fixed, or replace it by three prismatic and three revolute \
+             joints in series"
         }
         "planar" => "replace it by two prismatic and one continuous joint in series",
         _ => "replace it by three revolute joints in series with links of small mass between",

@@ -20,7 +20,7 @@ use nalgebra::{DMatrix, DVector};
 use crate::arm::bends::Bend;
 use crate::arm::options::Modelling;
 use crate::caveat::Finding;
-use crate::error::{Error, PoseError};
+use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot::drive_entry::ServoEntry;
 use crate::robot::gear_entry::GearLaws;
@@ -150,7 +150,13 @@ impl Arm {
         if light.is_empty() {
             return Error::Step { source, partial: false };
         }
-        PoseError::WithoutInertia { path: self.robot.urdf_path.clone(), source, links: light }.into()
+        Error::Pose(format!(
+            "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> \
+             with mass and inertia, have them estimated (inertia_from_density in the robot file), or keep everything \
+             before them rigid",
+            self.robot.urdf_path.display(),
+            light.join(", ")
+        ))
     }
 
     /// Names the elastic bodies and torque-driven joints without inertia in some direction: rows of

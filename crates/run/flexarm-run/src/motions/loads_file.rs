@@ -19,7 +19,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::caveat::{self, Finding};
-use crate::error::{Error, LoadError};
+use crate::error::Error;
 use crate::motions::applied_load::AppliedLoad;
 use crate::motions::load_jumps::jumps_of;
 use crate::motions::payload::PayloadChange;
@@ -118,24 +118,24 @@ impl LoadLocation {
     }
 
     /// Error about the value as a whole, with its location if it was read from a file.
-    pub(crate) fn entry(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
-        Self::error(written.map(|written| &written.entry), cause.into())
+    pub(crate) fn entry(written: Option<&Self>, cause: impl ToString) -> Error {
+        Self::error(written.map(|written| &written.entry), cause.to_string())
     }
 
     /// Error about the frame or link.
-    pub(crate) fn frame(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
-        Self::error(written.map(|written| &written.frame), cause.into())
+    pub(crate) fn frame(written: Option<&Self>, cause: impl ToString) -> Error {
+        Self::error(written.map(|written| &written.frame), cause.to_string())
     }
 
     /// Error about the inertia.
-    pub(crate) fn inertia(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
-        Self::error(written.map(|written| &written.inertia), cause.into())
+    pub(crate) fn inertia(written: Option<&Self>, cause: impl ToString) -> Error {
+        Self::error(written.map(|written| &written.inertia), cause.to_string())
     }
 
-    fn error(place: Option<&RobotFileError>, cause: LoadError) -> Error {
+    fn error(place: Option<&RobotFileError>, message: String) -> Error {
         match place {
-            Some(place) => RobotFileError { message: cause.to_string(), ..place.clone() }.into(),
-            None => cause.into(),
+            Some(place) => RobotFileError { message, ..place.clone() }.into(),
+            None => Error::Load(message),
         }
     }
 }

@@ -8,7 +8,7 @@ use flexarm_stepping::PrescribedMotion;
 use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory, foreign_joints};
 
 use crate::caveat::{self, Finding};
-use crate::error::{Error, PoseError, ValueError};
+use crate::error::Error;
 use crate::motions::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent};
 use crate::motions::tool_path::{Cell, ToolPath};
 use crate::robot::Robot;
@@ -132,7 +132,7 @@ impl Motion {
         let n = actuated.len();
         if q.len() != n * t.len() {
             let (found, times) = (q.len(), t.len());
-            return Err(PoseError::Samples { found, times, joints: n }.into());
+            return Err(Error::samples(found, times, n));
         }
         let column = |k: usize| q.iter().skip(k).step_by(n.max(1)).copied().collect();
         let joint = |(k, c): (usize, &Coordinate)| JointSamples {
@@ -234,7 +234,9 @@ impl Motion {
     /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if values overflow.
     pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
         if !(seconds > 0.0 && seconds.is_finite()) {
-            return Err(ValueError::CornerTime(seconds).into());
+            return Err(Error::Value(format!(
+                "corners are rounded within a positive time, found {seconds} s: try 0.02"
+            )));
         }
         let trajectory = self.trajectory.with_rounded_corners(seconds)?;
         let warnings = warnings(&trajectory, &self.path);

@@ -14,7 +14,7 @@ use crate::arm::Arm;
 use crate::arm::joint_values::joint_values;
 use crate::arm::options::Modelling;
 use crate::caveat::{self, Finding, kinds};
-use crate::error::{Error, PoseError};
+use crate::error::Error;
 use crate::poses::posed::{Posed, step_error};
 use crate::run::summary::Files;
 
@@ -133,7 +133,7 @@ pub(crate) fn modes_of(linear: &Linear) -> Result<Vec<DampedMode>, Error> {
 }
 
 pub(crate) fn linear_error(error: LinearError) -> Error {
-    PoseError::Linear(error).into()
+    Error::Pose(format!("the linear model at this pose: {error}"))
 }
 
 impl Arm {

@@ -12,7 +12,7 @@ use crate::arm::Arm;
 use crate::arm::joint_values::joint_values;
 use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Finding, kinds, of_use, once_each, validity};
-use crate::error::{Error, PoseError, ValueError};
+use crate::error::Error;
 use crate::motions::motion::Motion;
 use crate::robot::Robot;
 use crate::robot::balancer;
@@ -67,7 +67,7 @@ pub fn step_error(source: StepError) -> Error {
 }
 
 /// Checks a force and moment on the TCP (six values).
-pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
+pub fn check_wrench(wrench: &[f64]) -> Result<(), Error> {
     let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
     let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
     Ok(force.and(torque)?)
@@ -266,6 +266,9 @@ pub(crate) fn strains(arm: &Arm, plant: &Plant, q: &DVector<f64>) -> Vec<(f64, f
 pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
     match values.into_iter().all(|x| x.is_finite()) {
         true => Ok(()),
-        false => Err(PoseError::Overflow { what: what.to_owned() }.into()),
+        false => Err(Error::Pose(format!(
+            "{what} are not finite: a mass, a length, a stiffness, a force or a joint value is far too large or too \
+             small"
+        ))),
     }
 }

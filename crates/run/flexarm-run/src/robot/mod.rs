@@ -38,7 +38,7 @@ use flexarm_urdf::UrdfRobot;
 
 use crate::arm::options::Modelling;
 use crate::caveat::{self, Finding};
-use crate::error::{Error, ValueError};
+use crate::error::Error;
 use crate::robot::calibration_entry::Calibration;
 use crate::robot::controller_entry::RobotAxis;
 use crate::robot::drive_entry::Drive;
@@ -124,7 +124,7 @@ impl Robot {
         }
         let place = X_LT.translation.vector;
         if let Some(found) = place.iter().chain(X_LT.rotation.matrix().iter()).find(|x| !x.is_finite()) {
-            return Err(ValueError::NotFinite { what: "the pose of the TCP", found: *found }.into());
+            return Err(Error::not_finite("the pose of the TCP", *found));
         }
         for joint in self.rigid.joints.iter_mut().filter(|joint| joint.child == TCP_FRAME) {
             (joint.parent, joint.X_PJ) = (link.to_owned(), X_LT);
