@@ -35,11 +35,11 @@ ROOTS = [
     ("ImportSummary", "flexarm-linkmaker/src/import/summary.rs", "ImportSummary"),
     ("ExportSummary", "flexarm-linkmaker/src/export.rs", "ExportSummary"),
     ("Inspection", "flexarm-run/src/poses/inspect.rs", "Inspection"),
-    ("Finding", "flexarm-run/src/check.rs", "Finding"),
+    ("Finding", "flexarm-settings/src/finding.rs", "Finding"),
     ("NewRobot", "flexarm-new/src/report.rs", "NewRobot"),
 ]
 #: Python names of structs whose Rust names are ambiguous outside their module.
-NAMES = {"Caveat": "CaveatDict", "Files": "RunFiles"}
+NAMES = {"Files": "RunFiles"}
 #: Hand-written fields: key, type, whether it is always present, description.
 WRITTEN = {
     "RecordingFiles": [
@@ -60,7 +60,7 @@ PLAIN = {"f64": "float", "f32": "float", "bool": "bool", "String": "str", "str":
 PLAIN |= {f"{sign}{bits}": "int" for sign in "iu" for bits in ["8", "16", "32", "64", "size"]}
 #: Types that serialise as text or as any value.
 OPAQUE = {
-    "Severity": "Literal['warning', 'note']",
+    "Severity": "Literal['error', 'warning', 'note']",
     "Better": "Literal['lower', 'higher']",
     "Role": "Literal['value', 'factor', 'offset']",
     "ParameterValue": "float | str | bool",
@@ -167,7 +167,7 @@ class Types:
         for struct, file, name in ROOTS:
             path = next(ROOT.glob(f"crates/*/{file}"))
             self.typed(self.struct(struct, path), name)
-        out = [HEAD.format(names="\n".join(f'    "{name}",' for name in sorted(self.names.values())))]
+        out = [HEAD.format(names="\n".join(f'    "{name}",' for name in sorted([*self.names.values(), "CaveatDict"])))]
         for name, doc, fields in self.order:
             named = [f for f in fields if not keyword.iskeyword(f[0])]
             needed, optional = [f for f in named if f[2]], [f for f in named if not f[2]]
@@ -181,6 +181,7 @@ class Types:
                 out.append(f"class _{name}({base}):\n" + body("What is always there.", needed))
                 base, needed = f"_{name}, total=False", optional
             out.append(f"class {name}({base}):\n" + body(doc, needed))
+        out.append("#: A finding with a result: a warning or a note.\nCaveatDict = Finding\n")
         return "\n\n".join(out)
 
 

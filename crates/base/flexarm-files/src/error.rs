@@ -4,6 +4,8 @@ use std::path::{Path, PathBuf};
 
 use flexarm_settings::{Fault, Setting};
 
+use crate::TextFileError;
+
 /// Error of reading or writing a file.
 #[derive(Debug, thiserror::Error)]
 pub enum FileError {
@@ -15,6 +17,9 @@ pub enum FileError {
         /// Description of the problem and its remedy.
         what: String,
     },
+    /// The content of a file is wrong.
+    #[error(transparent)]
+    Text(#[from] TextFileError),
     /// The location of a result is already in use.
     #[error("{}", taken(path, place, *movable))]
     Taken {
@@ -39,7 +44,7 @@ impl FileError {
     /// Whether the input or the run is responsible.
     pub fn fault(&self) -> Fault {
         match self {
-            Self::Unusable { .. } | Self::Taken { .. } => Fault::Input,
+            Self::Unusable { .. } | Self::Text(_) | Self::Taken { .. } => Fault::Input,
             Self::Write { .. } => Fault::Run,
         }
     }

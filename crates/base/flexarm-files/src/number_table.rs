@@ -6,9 +6,9 @@
 
 use std::path::Path;
 
-use flexarm_settings::written::csv_fields;
+use flexarm_settings::written::{csv_column, csv_fields};
 
-use crate::{FileError, read_text};
+use crate::{FileError, TextFileError, read_text};
 
 /// Table of numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,45 +25,55 @@ impl NumberTable {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`FileError::Unusable`] if the file cannot be read, has no header, names a column twice, or
-    /// has a row with a different number of cells or a cell that is not a number. The message gives
-    /// the line, the column and what was found.
+    /// [`FileError::Unusable`] if the file cannot be read; [`FileError::Text`] if it has no header,
+    /// names a column twice, or has a row with a different number of cells or a cell that is not a
+    /// number.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let unusable = |fault: TableFault| FileError::Unusable { path: path.to_owned(), what: fault.to_string() };
-        Self::parse(&read_text(path)?).map_err(unusable)
-    }
-
-    fn parse(text: &str) -> Result<Self, TableFault> {
-        let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+        let text = read_text(path)?;
+        let text = text.trim_start_matches('\u{feff}');
+        let fault = |line: usize, column: Option<usize>, message: String| {
+            let (path, column) = (path.to_owned(), column.unwrap_or(1));
+            TextFileError { path, line, column, message, page: "" }
+        };
+        let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line));
         let counts = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
-        let (_, header) = lines.by_ref().find(|(_, line)| counts(line)).ok_or(TableFault::Empty)?;
+        let Some((header_line, header)) = lines.by_ref().find(|(_, line)| counts(line)) else {
+            return Err(fault(1, None, "the table is empty: expected a header".into()).into());
+        };
         let separator = [';', '\t'].into_iter().find(|c| header.contains(*c)).unwrap_or(',');
         let cells = |line: &str| -> Vec<String> {
             csv_fields(line, |c| c == separator, false).iter().map(|cell| cell.trim().to_owned()).collect()
         };
+        let column = |line: &str, field: usize| csv_column(line, |c| c == separator, false, field);
         let names = cells(header);
         for (k, name) in names.iter().enumerate() {
-            if name.is_empty() {
-                return Err(TableFault::Unnamed { column: k + 1 });
-            }
-            if names[..k].contains(name) {
-                return Err(TableFault::NamedTwice { name: name.clone() });
-            }
-            if name.parse::<f64>().is_ok() {
-                return Err(TableFault::NoHeader { number: name.clone() });
-            }
+            let message = match name {
+                name if name.is_empty() => format!("column {} of the header has no name", k + 1),
+                name if names[..k].contains(name) => {
+                    format!("the header names {name:?} twice: rename or remove one of the columns")
+                }
+                name if name.parse::<f64>().is_ok() => {
+                    format!("the first row has the number {name} where a name was expected: add a header")
+                }
+                _ => continue,
+            };
+            return Err(fault(header_line, column(header, k), message).into());
         }
         let mut table = Self { names, rows: Vec::new(), lines: Vec::new() };
-        for (line, cells) in lines.filter(|(_, line)| counts(line)).map(|(k, line)| (k + 1, cells(line))) {
+        for (line, text) in lines.filter(|(_, line)| counts(line)) {
+            let cells = cells(text);
             let (found, expected) = (cells.len(), table.names.len());
             if found != expected {
-                return Err(TableFault::Cells { line, found, expected });
+                let message = format!("expected {expected} cells as in the header, found {found}");
+                return Err(fault(line, None, message).into());
             }
-            let value = |(name, cell): (&String, &String)| {
-                let not_a_number = || TableFault::NotANumber { line, column: name.clone(), found: cell.clone() };
-                number_of(cell, separator != ',').ok_or_else(not_a_number)
+            let value = |(k, cell): (usize, &String)| {
+                number_of(cell, separator != ',').ok_or_else(|| {
+                    let message = format!("column {:?}: expected a number, found {cell:?}", table.names[k]);
+                    fault(line, column(text, k), message)
+                })
             };
-            let row = table.names.iter().zip(&cells).map(value).collect::<Result<Vec<f64>, _>>()?;
+            let row = cells.iter().enumerate().map(value).collect::<Result<Vec<f64>, _>>()?;
             table.rows.push(row);
             table.lines.push(line);
         }
@@ -74,23 +84,6 @@ impl NumberTable {
     pub fn column(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|known| known == name)
     }
-}
-
-/// Reason why a text is not a table of numbers.
-#[derive(Debug, thiserror::Error)]
-enum TableFault {
-    #[error("the table is empty: expected a header")]
-    Empty,
-    #[error("column {column} of the header has no name")]
-    Unnamed { column: usize },
-    #[error("the header names {name:?} twice: rename or remove one of the columns")]
-    NamedTwice { name: String },
-    #[error("the first row has the number {number} where a name was expected: add a header")]
-    NoHeader { number: String },
-    #[error("line {line}: expected {expected} cells as in the header, found {found}")]
-    Cells { line: usize, found: usize, expected: usize },
-    #[error("line {line}, column {column:?}: expected a number, found {found:?}")]
-    NotANumber { line: usize, column: String, found: String },
 }
 
 /// A finite number; NaN for an empty cell.

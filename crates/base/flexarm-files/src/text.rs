@@ -24,7 +24,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
     };
     // Devices may be endless, and pipes may block.
     if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(fail("cannot be read: this is not a file".into()));
+        return Err(fail("cannot be read: this is not a file; give the path of a regular one".into()));
     }
     let mut text = String::new();
     let size = std::fs::File::open(path).and_then(|file| file.take(LARGEST + 1).read_to_string(&mut text));

@@ -34,8 +34,8 @@ fn what_is_no_table_of_numbers_is_said_with_line_and_column() {
     fails("", "empty");
     fails("a,a\n1,2\n", "twice");
     fails("1,2\n3,4\n", "add a header");
-    fails("a,b\n1\n", "line 2: expected 2 cells");
-    fails("a,b\n1,x\n", "line 2, column \"b\": expected a number, found \"x\"");
+    fails("a,b\n1\n", ":2:1: expected 2 cells");
+    fails("a,b\n1,x\n", ":2:3: column \"b\": expected a number, found \"x\"");
     fails("a,b\n1,inf\n", "found \"inf\"");
     fails("a,b\n1,2,5\n", "expected 2 cells");
 }

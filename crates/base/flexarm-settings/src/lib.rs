@@ -1,5 +1,5 @@
 //! Building blocks of errors and caveats: settings named in messages, which each front end names in
-//! its own way ([`Setting`]); the [`Caveat`], which compares a value with a reference; the party
+//! its own way ([`Setting`]); what is found in an input or a result ([`Finding`]); the party
 //! responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); choices by a
 //! word ([`Words`]); TOML messages without type names ([`without_types`]); escaping of foreign text
 //! for each kind of output ([`written`]).
@@ -17,10 +17,10 @@
 //! ```
 //!
 //! Not here: values, defaults and meaning of the settings, which are fields of the crate they
-//! belong to; the kinds of caveats and their references, which are in the crates that find them.
+//! belong to; the kinds of findings and their references, which are in the crates that find them.
 
-pub mod caveat;
 mod fault;
+pub mod finding;
 mod gathered;
 mod quantity;
 mod spelling;
@@ -31,8 +31,8 @@ pub mod written;
 use std::fmt;
 use std::sync::OnceLock;
 
-pub use caveat::Caveat;
 pub use fault::Fault;
+pub use finding::{Finding, Severity};
 pub use gathered::gathered;
 pub use quantity::{OutOfRange, Quantity};
 pub use spelling::{closest, known_names};

@@ -2,7 +2,7 @@
 //!
 //! The ranges are wide: a number outside cannot belong to a robot, whatever its unit. They bound
 //! the ratios of masses, lengths and stiffnesses so that matrices made of them can be factorised.
-//! Possible but unlikely values are reported as a [`crate::Caveat`].
+//! Possible but unlikely values are reported as a [`crate::Finding`].
 
 use std::fmt;
 

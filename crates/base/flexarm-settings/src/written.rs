@@ -218,3 +218,15 @@ pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -
     fields.push(close(&mut field, &mut was_quoted));
     fields
 }
+
+/// Column of a field of a line in characters, from 1; `None` if the line has fewer fields. The other
+/// arguments are those of [`csv_fields`].
+pub fn csv_column(line: &str, is_separator: impl Fn(char) -> bool, runs: bool, field: usize) -> Option<usize> {
+    let mut quoted = false;
+    let ends = line.chars().enumerate().filter_map(|(k, letter)| {
+        quoted ^= letter == '"';
+        (is_separator(letter) && !quoted).then_some(k + 1)
+    });
+    let begins = |k: &usize| !runs || line.chars().nth(*k).is_some_and(|letter| !is_separator(letter));
+    std::iter::once(0).chain(ends).filter(begins).nth(field).map(|k| k + 1)
+}

@@ -1,7 +1,7 @@
 //! The tests of the crate, as one program: it links once.
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 
-mod caveat;
+mod finding;
 mod names;
 mod words;
 mod written;

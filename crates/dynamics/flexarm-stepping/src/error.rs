@@ -46,7 +46,7 @@ pub enum StepError {
     BeyondModel {
         /// Time (s).
         t: f64,
-        /// Caveat about the link.
+        /// Finding about the link.
         doubt: String,
     },
     /// A matrix that must be positive definite is not.

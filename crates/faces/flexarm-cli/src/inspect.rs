@@ -30,6 +30,6 @@ pub(crate) fn check(terminal: &Terminal, args: &CheckArgs) -> Result<ExitCode, F
     let json = || serde_json::json!({ "findings": findings }).to_string();
     // Messages, which editors and scripts read line by line, are not wrapped.
     answer_as_is(terminal, json, || visible(&print::findings(&findings)));
-    let wrong = findings.iter().any(|f| f.severity == "error");
+    let wrong = findings.iter().any(|f| f.is_error());
     Ok(if wrong { ExitCode::from(2) } else { ExitCode::SUCCESS })
 }

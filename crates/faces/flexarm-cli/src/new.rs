@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use flexarm::new::{NewLink, Reducer};
 use flexarm::robots::{NewOptions, NewRobot, ReadOptions};
 use flexarm::settings::gathered;
-use flexarm::{Keep, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Summary};
+use flexarm::{Keep, LoadOptions, Modelling, Motion, Outputs, Robot, RunOptions, RunRequest, Severity, Summary};
 
 use crate::args::RobotArgs;
 use crate::failure::Failure;
@@ -131,10 +131,10 @@ pub(crate) fn run(terminal: &Terminal, args: &NewArgs) -> Result<ExitCode, Failu
     if !args.no_run {
         made.summary = Some(Box::new(first_run(terminal, &made, &folder, args.force)?));
     }
-    let findings = made.findings.iter().filter(|f| f.severity != "note");
+    let findings = made.findings.iter().filter(|f| f.severity != Severity::Note);
     warnings(terminal, &findings.map(|f| format!("{}: {}", f.location, f.message)).collect::<Vec<_>>());
     answer_as_is(terminal, || to_json(&made), || text(&made));
-    let wrong = made.findings.iter().any(|f| f.severity == "error");
+    let wrong = made.findings.iter().any(|f| f.is_error());
     Ok(if wrong { ExitCode::from(1) } else { ExitCode::SUCCESS })
 }
 

@@ -4,9 +4,9 @@ use std::io::Write as _;
 
 use crate::layout::{filled, lines, table};
 use crate::terminal::{Terminal, readable};
-use flexarm::Caveat;
+use flexarm::Finding;
 use flexarm::links::reduce::{MeshListing, ReduceSummary, ReportTable, SetListing};
-use flexarm::robots::{BalancerInfo, Finding, FlexibleInfo, Inspection, LoopInfo, RobotExport};
+use flexarm::robots::{BalancerInfo, FlexibleInfo, Inspection, LoopInfo, RobotExport};
 use flexarm::settings::gathered;
 use flexarm::settings::written::{message, visible};
 
@@ -157,7 +157,7 @@ pub(crate) fn findings(findings: &[Finding]) -> String {
     if findings.is_empty() {
         return "nothing found\n".into();
     }
-    let line = |f: &Finding| format!("{}[{}] {}: {}", f.severity, f.code, f.location, f.message);
+    let line = |f: &Finding| format!("{}[{}] {}: {}", f.severity.word(), f.code, f.location, f.message);
     let lines: Vec<String> = findings.iter().map(line).collect();
     let mut out = String::new();
     for line_text in gathered(&lines) {
@@ -167,7 +167,7 @@ pub(crate) fn findings(findings: &[Finding]) -> String {
             out += &format!("    help: {}\n", message(help));
         }
     }
-    let count = |severity: &str| match findings.iter().filter(|f| f.severity == severity).count() {
+    let count = |severity: &str| match findings.iter().filter(|f| f.severity.word() == severity).count() {
         1 => format!("1 {severity}"),
         n => format!("{n} {severity}s"),
     };
@@ -328,8 +328,8 @@ pub(crate) fn warnings(terminal: &Terminal, texts: &[String]) {
 
 /// Prints the warnings among the caveats. Those of the robot description are summarised in one
 /// line; `check` and `new` list them in full.
-pub(crate) fn caveats(terminal: &Terminal, caveats: &[Caveat]) {
-    let (of_description, own): (Vec<&Caveat>, Vec<&Caveat>) =
+pub(crate) fn caveats(terminal: &Terminal, caveats: &[Finding]) {
+    let (of_description, own): (Vec<&Finding>, Vec<&Finding>) =
         caveats.iter().filter(|caveat| caveat.warns()).partition(|caveat| caveat.of_description);
     let mut texts: Vec<String> = own.into_iter().map(|caveat| caveat.message.clone()).collect();
     match of_description.as_slice() {

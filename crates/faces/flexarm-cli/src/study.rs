@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ffi::OsString;
 
 use clap::{CommandFactory, FromArgMatches};
-use flexarm::{Caveat, Summary};
+use flexarm::{Finding, Summary};
 
 use crate::args::RunArgs;
 use crate::commands::{Cli, Command};
@@ -24,13 +24,13 @@ const SHARED: [&str; 10] =
     ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet", "also"];
 
 /// Returns the caveats of all runs without duplicates; those of additional runs carry their labels.
-pub(crate) fn caveats(summary: &Summary) -> Vec<Caveat> {
+pub(crate) fn caveats(summary: &Summary) -> Vec<Finding> {
     let mut all = summary.caveats.clone();
     for other in &summary.with {
-        let is_new = |caveat: &&Caveat| !all.iter().any(|known| known.message.ends_with(&caveat.message));
-        let new: Vec<Caveat> = other.caveats.iter().filter(is_new).cloned().collect();
+        let is_new = |caveat: &&Finding| !all.iter().any(|known| known.message.ends_with(&caveat.message));
+        let new: Vec<Finding> = other.caveats.iter().filter(is_new).cloned().collect();
         let label = other.label.as_deref().unwrap_or_default();
-        all.extend(new.into_iter().map(|c| Caveat { message: format!("{label}: {}", c.message), ..c }));
+        all.extend(new.into_iter().map(|c| Finding { message: format!("{label}: {}", c.message), ..c }));
     }
     all
 }

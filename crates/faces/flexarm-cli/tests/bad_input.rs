@@ -138,7 +138,7 @@ mod trajectory {
     fn joint_that_the_robot_lacks() {
         let csv = "time,swong\n0,0\n1,0.5\n";
         let words = ["\"swong\" is not a joint of the robot", "did you mean \"swing\"?", "rename"];
-        compare_motion("extra.csv", csv, &[&["extra.csv, line 1, column 2"], &words[..]].concat());
+        compare_motion("extra.csv", csv, &[&["extra.csv:1:6"], &words[..]].concat());
         let toml = with(SWING, "\"swing\"", "\"swong\"");
         compare_motion("other.toml", toml, &[&["other.toml"], &words[..]].concat());
     }
@@ -172,22 +172,22 @@ mod trajectory {
     #[test]
     fn unit_in_csv() {
         let csv = "# made by hand\n# unit: grad\ntime,swing\n0,0\n1,0.5\n";
-        compare_motion("m.csv", csv, &["m.csv, line 2", "\"grad\"", "accepted: rad, deg"]);
+        compare_motion("m.csv", csv, &["m.csv:2:", "\"grad\"", "accepted: rad, deg"]);
         let csv = "# time: ms\ntime,swing\n0,0\n1,0.5\n";
-        compare_motion("m.csv", csv, &["m.csv, line 1", "\"ms\"", "`time`", "accepted: s"]);
+        compare_motion("m.csv", csv, &["m.csv:1:", "\"ms\"", "`time`", "accepted: s"]);
     }
 
     #[test]
     fn unit_in_toml() {
         let toml = with(SWING, "\"deg\"", "\"degrees\"");
-        compare_motion("m.toml", toml, &["m.toml, line 2", "\"degrees\"", "\"rad\", \"deg\""]);
+        compare_motion("m.toml", toml, &["m.toml:2:", "\"degrees\"", "\"rad\", \"deg\""]);
     }
 
     #[test]
     fn time_that_does_not_increase() {
         for (last, found) in [("0.5", "0.5 s does not follow 1 s"), ("1", "1 s does not follow 1 s")] {
             let csv = format!("time,swing\n0,0\n1,0.5\n{last},0.2\n");
-            compare_motion("m.csv", csv, &["m.csv, line 4", "column 1", found, "increase", "sort"]);
+            compare_motion("m.csv", csv, &["m.csv:4:1", found, "increase", "sort"]);
         }
     }
 
@@ -195,18 +195,18 @@ mod trajectory {
     fn number_that_is_none() {
         for found in ["NaN", "inf", "-Infinity", "1.0.0", "", "0x10", "1e999"] {
             let csv = format!("time,swing\n0,0\n1,{found}\n2,0.2\n");
-            compare_motion("m.csv", csv, &["m.csv, line 3", "column 2", "swing", "number"]);
+            compare_motion("m.csv", csv, &["m.csv:3:3", "swing", "number"]);
         }
         let csv = "time,swing\nNaN,0\n1,0.1\n";
-        compare_motion("m.csv", csv, &["m.csv, line 2", "column 1", "time", "\"NaN\""]);
+        compare_motion("m.csv", csv, &["m.csv:2:1", "time", "\"NaN\""]);
     }
 
     #[test]
     fn ragged_rows() {
         let short = "time,swing\n0,0\n1,0.1\n2\n";
-        compare_motion("m.csv", short, &["m.csv, line 4", "1 fields", "2", "cut off"]);
+        compare_motion("m.csv", short, &["m.csv:4:", "1 fields", "2", "cut off"]);
         let long = "time,swing\n0,0\n1,0.1,7\n2,0.2\n";
-        compare_motion("m.csv", long, &["m.csv, line 3", "3 fields", "2"]);
+        compare_motion("m.csv", long, &["m.csv:3:", "3 fields", "2"]);
     }
 
     #[test]
@@ -219,16 +219,16 @@ mod trajectory {
 
     #[test]
     fn no_time_column() {
-        compare_motion("m.csv", "x,swing\n0,0\n1,0.1\n", &["m.csv, line 1", "`time`", "\"swing\""]);
+        compare_motion("m.csv", "x,swing\n0,0\n1,0.1\n", &["m.csv:1:", "`time`", "\"swing\""]);
     }
 
     #[test]
     fn other_separators() {
-        compare_motion("m.csv", "time,swing\n0,0,0,0\n1,0,0,1\n", &["m.csv, line 2", "decimal commas", "semicolons"]);
+        compare_motion("m.csv", "time,swing\n0,0,0,0\n1,0,0,1\n", &["m.csv:2:", "decimal commas", "semicolons"]);
         compare_motion(
             "m.csv",
             "time;swing\n0;0.5\n1;0,1\n",
-            &["m.csv, line 3", "decimal points (line 2)", "decimal commas (line 3)"],
+            &["m.csv:3:", "decimal points (line 2)", "decimal commas (line 3)"],
         );
     }
 
@@ -248,13 +248,13 @@ mod trajectory {
             let answer = compare_motion("m.toml", &SWING[..length], &["m.toml"]);
             assert!(!answer.err.contains("untagged"), "{}", answer.err);
         }
-        compare_motion("m.toml", &SWING[..40], &["m.toml, line 3", "expected"]);
+        compare_motion("m.toml", &SWING[..40], &["m.toml:3:", "expected"]);
     }
 
     #[test]
     fn toml_key_misspelt() {
         let toml = with(SWING, "hold", "hodl");
-        let line = format!("m.toml, line {}", line_of(&toml, "hodl"));
+        let line = format!("m.toml:{}:", line_of(&toml, "hodl"));
         compare_motion("m.toml", toml, &[&line, "`hodl`", "`hold`"]);
     }
 
@@ -267,7 +267,7 @@ mod trajectory {
         let toml = with(SWING, "to = [60.0]", "to = [nan]");
         compare_motion("m.toml", toml, &["m.toml, line", "`to", "NaN"]);
         let toml = with(SWING, "\"quintic\"", "\"septic\"");
-        compare_motion("m.toml", toml, &["m.toml, line 5", "septic", "quintic"]);
+        compare_motion("m.toml", toml, &["m.toml:5:", "septic", "quintic"]);
         let toml = with(SWING, "format = 1", "format = 7");
         compare_motion("m.toml", toml, &["m.toml", "7", "format = 1"]);
     }
@@ -394,7 +394,7 @@ mod robot_description {
         let again =
             "<joint name=\"again\" type=\"fixed\"><parent link=\"base\"/><child link=\"ball\"/></joint>\n</robot>";
         let text = with(URDF, "</robot>", again);
-        let first = format!("(line {})", line_of(URDF, "\"weld\""));
+        let first = format!("(arm.urdf:{}:", line_of(URDF, "\"weld\""));
         urdf(&text, "again", &["link \"ball\"", "two joints", "\"weld\"", &first, "\"again\"", "remove"]);
     }
 
@@ -405,7 +405,7 @@ mod robot_description {
         let text = with(URDF, "\"revolute\"", "\"revolut\"");
         urdf(&text, "revolut", &["\"swing\"", "\"revolut\"", "did you mean \"revolute\"?"]);
         let again = with(URDF, "</robot>", "<link name=\"bar\"/><!-- again -->\n</robot>");
-        let first = format!("first in line {}", line_of(URDF, "<link name=\"bar\">"));
+        let first = format!("first at arm.urdf:{}:", line_of(URDF, "<link name=\"bar\">"));
         urdf(&again, "again", &["link \"bar\"", "twice", &first]);
     }
 
@@ -969,13 +969,13 @@ fn units_that_contradict_what_a_joint_does_are_refused_wherever_it_is_told() {
     place.write("slide.toml", ROBOT.replace("beam.urdf", "slide.urdf"));
     let run = |robot: &'static str, motion: &'static str| ["compare", robot, motion, "-o", "result"];
     let mend = ["joint \"swing\" slides", "read as degrees", "add \"swing\" to `metres`"];
-    place.refused(&run("slide.toml", "swing.toml"), &[&["swing.toml, line 2"][..], &mend].concat());
+    place.refused(&run("slide.toml", "swing.toml"), &[&["swing.toml:2:"][..], &mend].concat());
     place.write("deg.csv", "# unit: deg\ntime,swing\n0,0\n1,0.1\n2,0.1\n");
-    place.refused(&run("slide.toml", "deg.csv"), &[&["deg.csv, line 1"][..], &mend].concat());
+    place.refused(&run("slide.toml", "deg.csv"), &[&["deg.csv:1:"][..], &mend].concat());
     let sampled =
         "format = 1\nunit = \"deg\"\njoints = [\"swing\"]\n[samples]\ntime = [0.0, 1.0]\nposition = [[0.0], [0.1]]\n";
     place.write("sampled.toml", sampled);
-    place.refused(&run("slide.toml", "sampled.toml"), &[&["sampled.toml, line 2"][..], &mend].concat());
+    place.refused(&run("slide.toml", "sampled.toml"), &[&["sampled.toml:2:"][..], &mend].concat());
     for at in ["1deg", "swing=1deg"] {
         place.refused(&["statics", "slide.toml", "--at", at], &["joint \"swing\" slides", "give it in m"]);
     }
@@ -985,9 +985,9 @@ fn units_that_contradict_what_a_joint_does_are_refused_wherever_it_is_told() {
     );
     let turns = ["joint \"swing\" turns", "take it out of `metres`"];
     place.write("m.toml", with(SWING, "unit = \"deg\"", "unit = \"deg\"\nmetres = [\"swing\"]"));
-    place.refused(&run("robot.toml", "m.toml"), &[&["m.toml, line 3"][..], &turns].concat());
+    place.refused(&run("robot.toml", "m.toml"), &[&["m.toml:3:"][..], &turns].concat());
     place.write("m.csv", "# metres: swing\ntime,swing\n0,0\n1,0.1\n2,0.1\n");
-    place.refused(&run("robot.toml", "m.csv"), &[&["m.csv, line 1"][..], &turns].concat());
+    place.refused(&run("robot.toml", "m.csv"), &[&["m.csv:1:"][..], &turns].concat());
     // Correct units are read: 0.3 m, and radians without a unit.
     place.write(
         "right.toml",

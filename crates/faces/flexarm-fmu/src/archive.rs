@@ -9,7 +9,7 @@ use std::io::{Cursor, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm::caveat::{Caveat, Use, warnings};
+use flexarm::caveat::{Finding, Use, warnings};
 use flexarm::errors::FileError;
 use flexarm::links::reduce::STRESS_FILE;
 use flexarm::robots::{InertiaEstimate, ReadOptions};
@@ -96,7 +96,7 @@ pub struct FmuSummary {
     /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
     /// Caveats about the robot, its pose and the step.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> FmuError + '_ {

@@ -1,6 +1,6 @@
 //! Caveats (probable mistakes in inputs, limits of results) as warnings of their own class.
 
-use flexarm::Caveat;
+use flexarm::Finding;
 use flexarm::settings::{gathered, written};
 use pyo3::call::PyCallArgs;
 use pyo3::prelude::*;
@@ -9,9 +9,9 @@ use pyo3::types::{PyDict, PyList};
 use crate::values::plain;
 
 /// Converts caveats to instances of `flexarm.Caveat`, which can be passed to `warnings.warn`.
-pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'py, PyList>> {
+pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Finding]) -> PyResult<Bound<'py, PyList>> {
     let class = py.import("flexarm.errors")?.getattr("Caveat")?;
-    let instance = |caveat: &Caveat| -> PyResult<Bound<'py, PyAny>> {
+    let instance = |caveat: &Finding| -> PyResult<Bound<'py, PyAny>> {
         let fields = PyDict::new(py);
         fields.set_item("severity", caveat.severity.word())?;
         fields.set_item("code", &caveat.code)?;
@@ -27,8 +27,8 @@ pub(crate) fn list<'py>(py: Python<'py>, caveats: &[Caveat]) -> PyResult<Bound<'
 }
 
 /// Issues caveats of severity warning as Python warnings at the caller's line; logs the others.
-pub(crate) fn issue(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
-    let (warnings, notes): (Vec<Caveat>, Vec<Caveat>) = caveats.iter().cloned().partition(Caveat::warns);
+pub(crate) fn issue(py: Python<'_>, caveats: &[Finding]) -> PyResult<()> {
+    let (warnings, notes): (Vec<Finding>, Vec<Finding>) = caveats.iter().cloned().partition(Finding::warns);
     if !notes.is_empty() {
         say(py, "notes", (list(py, &notes)?,))?;
     }
@@ -42,9 +42,9 @@ pub(crate) fn issue(py: Python<'_>, caveats: &[Caveat]) -> PyResult<()> {
     let texts: Vec<String> = warnings.iter().map(|caveat| caveat.message.clone()).collect();
     let of = |text: String| {
         let first = warnings.iter().find(|caveat| text.starts_with(&caveat.message));
-        Caveat { message: text, ..first.cloned().unwrap_or_default() }
+        Finding { message: text, ..first.cloned().unwrap_or_default() }
     };
-    let warnings: Vec<Caveat> = gathered(&texts).into_iter().map(of).collect();
+    let warnings: Vec<Finding> = gathered(&texts).into_iter().map(of).collect();
     for caveat in list(py, &warnings)? {
         warn.call((caveat,), Some(&level))?;
     }
@@ -65,7 +65,7 @@ pub(crate) fn say<'py>(py: Python<'py>, what: &str, arguments: impl PyCallArgs<'
 pub(crate) fn answer<'py>(
     py: Python<'py>,
     found: &impl serde::Serialize,
-    caveats: &[Caveat],
+    caveats: &[Finding],
 ) -> PyResult<Bound<'py, PyAny>> {
     let figures = plain(py, found)?;
     say(py, "wrote", (&figures,))?;

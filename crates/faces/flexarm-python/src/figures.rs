@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm::Caveat;
+use flexarm::Finding;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyList;
@@ -29,12 +29,12 @@ enum Source {
 /// Figures and caveats of a result.
 pub(crate) struct Figures {
     source: Source,
-    caveats: Vec<Caveat>,
+    caveats: Vec<Finding>,
 }
 
 impl Figures {
     /// Wraps the figures of a computed result.
-    pub(crate) fn of(found: impl serde::Serialize + Send + Sync + 'static, caveats: &[Caveat]) -> Self {
+    pub(crate) fn of(found: impl serde::Serialize + Send + Sync + 'static, caveats: &[Finding]) -> Self {
         Self { source: Source::Found(Arc::new(found)), caveats: caveats.to_vec() }
     }
 

@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use flexarm::new::Reducer;
-use flexarm::robots::{Finding, NewOptions, ReadOptions, new_robot as make};
+use flexarm::robots::{NewOptions, ReadOptions, new_robot as make};
 use flexarm::settings::written::message;
+use flexarm::{Finding, Severity};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -76,7 +77,8 @@ pub(crate) fn new_robot<'py>(
         let [location, message] = [&finding.location, &finding.message].map(|text| message(text));
         Finding { location, message, ..finding.clone() }
     };
-    let doubtful: Vec<_> = made.findings.iter().filter(|finding| finding.severity != "note").map(shown).collect();
+    let doubtful: Vec<_> =
+        made.findings.iter().filter(|finding| finding.severity != Severity::Note).map(shown).collect();
     caveat::say(py, "doubts", (plain(py, &doubtful)?,))?;
     caveat::answer(py, &made, &[])
 }

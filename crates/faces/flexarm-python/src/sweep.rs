@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use flexarm::Caveat;
+use flexarm::Finding;
 use flexarm::sweep::{Finders, Shard, Sweep, SweepRequest};
 use pyo3::prelude::*;
 
@@ -73,6 +73,6 @@ pub(crate) fn sweep<'py>(
         close.call0()?;
     }
     let found = result?.or_raise()?;
-    let caveats: Vec<Caveat> = found.caveats.iter().map(|figures| figures.caveat.clone()).collect();
+    let caveats: Vec<Finding> = found.caveats.iter().map(|figures| figures.caveat.clone()).collect();
     caveat::answer(py, &found, &caveats)
 }

@@ -40,7 +40,7 @@
 //! | `sensitivity` | the parameters of the robot with the strongest effect on the error |
 //! | `link_models` | every link model against a reference: accuracy and cost |
 //!
-//! An [`Error`] states its cause with numbers; a [`Caveat`] warns of a doubtful result. Both carry
+//! An [`Error`] states its cause with numbers; a [`Finding`] warns of a doubtful result. Both carry
 //! the settings that would fix them as values ([`settings::Setting`]); a front end sets their names once
 //! ([`settings::name_settings`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
@@ -65,7 +65,7 @@ pub use flexarm_sweep as sweep;
 
 pub use flexarm_kinematics::{Pose, Wrench};
 pub use flexarm_run::{
-    Arm, Caveat, DriveModel, Error, Fault, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, PayloadChange,
+    Arm, DriveModel, Error, Fault, Finding, Keep, LinkModel, LoadOptions, Modelling, Motion, Outputs, PayloadChange,
     Robot, RobotSource, Run, RunOptions, RunRequest, Scenario, Severity, Summary, check, inspect,
 };
 pub use flexarm_stepping::StepperKind;
@@ -107,10 +107,10 @@ pub mod robots {
     pub use flexarm_kinematics::{BalancerCurve, BalancerLaw, Coordinate, GasLaw, LinkInertia, Model};
     pub use flexarm_new::{NewOptions, NewRobot, new_robot};
     pub use flexarm_run::{
-        BalancerEnds, BalancerInfo, Bend, CouplingInfo, DependentInfo, Description, Drive, DriveKind, Finding,
-        FlexibleInfo, GearHysteresis, Inspection, JointInfo, LinkChoices, LinkInfo, LoopInfo, MountingInfo, Owner,
-        RobotBalancer, RobotCoupling, RobotExport, RobotFormat, RobotLink, RobotLoop, RobotMounting, StressSource,
-        TCP_FRAME, TcpInfo, check_with_loads, check_with_motion,
+        BalancerEnds, BalancerInfo, Bend, CouplingInfo, DependentInfo, Description, Drive, DriveKind, FlexibleInfo,
+        GearHysteresis, Inspection, JointInfo, LinkChoices, LinkInfo, LoopInfo, MountingInfo, Owner, RobotBalancer,
+        RobotCoupling, RobotExport, RobotFormat, RobotLink, RobotLoop, RobotMounting, StressSource, TCP_FRAME, TcpInfo,
+        check_with_loads, check_with_motion,
     };
     pub use flexarm_settings::known_names;
     pub use flexarm_urdf::{InertiaEstimate, ReadOptions, closest, search_paths_from_environment};
@@ -215,10 +215,7 @@ pub mod errors {
     pub use flexarm_motion_io::MotionError;
     pub use flexarm_new::NewError;
     pub use flexarm_path::PathError;
-    pub use flexarm_run::{
-        BalancerError, ChannelError, LinkFormError, LoadError, LoopError, ModellingError, PayloadError, PoseError,
-        RecordingError, RobotFileError, StudyError, ValueError,
-    };
+    pub use flexarm_run::{LoopError, RecordingError, RobotFileError};
     pub use flexarm_stepping::StepError;
     pub use flexarm_trajectory::{ColumnMapError, TrajectoryError};
 }

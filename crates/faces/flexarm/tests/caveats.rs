@@ -280,7 +280,7 @@ fn slips_are_told_and_plausible_robots_are_not() {
 fn the_page_lists_the_codes_of_the_program() {
     let page = std::fs::read_to_string(project("docs/caveats.md")).unwrap();
     let source = program_source(&project("crates"));
-    let makers = ["from_message(", "CaveatKind::warning(", "CaveatKind::note("];
+    let makers = ["Finding::warning(", "FindingKind::warning(", "FindingKind::note("];
     let calls = makers.iter().flat_map(|maker| source.split(maker).skip(1));
     let codes: BTreeSet<&str> =
         calls.filter_map(|rest| rest.trim_start().strip_prefix('"')?.split('"').next()).collect();

@@ -11,7 +11,7 @@ use flexarm::motions::{MotionOptions, motion_report};
 use flexarm::poses::ResponseRequest;
 use flexarm::robots::check_with_loads;
 use flexarm::sensitivity::{SensitivityRequest, pose_sensitivity, sensitivity};
-use flexarm::{Caveat, LoadOptions, Modelling, Motion, Robot, RunOptions, Scenario, inspect};
+use flexarm::{Finding, LoadOptions, Modelling, Motion, Robot, RunOptions, Scenario, inspect};
 
 fn project(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(path)
@@ -41,7 +41,7 @@ impl Folder {
 }
 
 /// Codes of warnings.
-fn codes(caveats: &[Caveat]) -> BTreeSet<String> {
+fn codes(caveats: &[Finding]) -> BTreeSet<String> {
     caveats.iter().filter(|c| c.warns() && c.code != "missing-mesh").map(|c| c.code.clone()).collect()
 }
 
@@ -66,18 +66,15 @@ fn every_command_with_a_pose_says_of_a_robot_what_check_says() {
     let folder = Folder::new("said-at-poses");
     let (file, _) = odd_robot(&folder);
     let findings = check_with_loads(&file, None, None, &LoadOptions::default());
-    let told: BTreeSet<String> = findings
-        .iter()
-        .filter(|f| f.severity == "warning" && f.code != "missing-mesh")
-        .map(|f| f.code.clone())
-        .collect();
+    let told: BTreeSet<String> =
+        findings.iter().filter(|f| f.warns() && f.code != "missing-mesh").map(|f| f.code.clone()).collect();
     // The first two are caveats of the robot, the last one of the arm at its pose.
     for code in ["gear-stiffness", "no-damping", "gear-rotation"] {
         assert!(told.contains(code), "{told:?}");
     }
     let robot = Robot::load(&file).unwrap();
     let modelling = Modelling::default();
-    let says = |what: &str, caveats: &[Caveat], warnings: &[String]| {
+    let says = |what: &str, caveats: &[Finding], warnings: &[String]| {
         let said = codes(caveats);
         assert!(told.is_subset(&said), "{what} does not say {:?}", told.difference(&said));
         let sentences: Vec<String> = caveats.iter().filter(|c| c.warns()).map(|c| c.message.clone()).collect();
@@ -116,18 +113,15 @@ fn every_command_with_a_motion_says_of_it_and_of_its_loads_what_check_says() {
     let loads = folder
         .write("loads.toml", "format = 1\n[[load]]\nkind = \"sine\"\nforce = [50, 0, 0]\nfrequency = 2\nphase = 90\n");
     let findings = check_with_loads(&file, Some(&motion), Some(&loads), &LoadOptions::default());
-    let told: BTreeSet<String> = findings
-        .iter()
-        .filter(|f| f.severity == "warning" && f.code != "missing-mesh")
-        .map(|f| f.code.clone())
-        .collect();
+    let told: BTreeSet<String> =
+        findings.iter().filter(|f| f.warns() && f.code != "missing-mesh").map(|f| f.code.clone()).collect();
     for code in ["gear-stiffness", "no-damping", "gear-rotation", "angle"] {
         assert!(told.contains(code), "{told:?}");
     }
     let robot = Robot::load(&file).unwrap();
     let own = Motion::load(&motion, &robot).unwrap();
     let scenario = Scenario::new(own.clone()).with_loads_file(&loads).unwrap();
-    let says = |what: &str, caveats: &[Caveat], warnings: &[String]| {
+    let says = |what: &str, caveats: &[Finding], warnings: &[String]| {
         let said = codes(caveats);
         assert!(told.is_subset(&said), "{what} does not say {:?}", told.difference(&said));
         assert_eq!(warnings.len(), caveats.iter().filter(|c| c.warns()).count(), "{what}");

@@ -26,7 +26,10 @@ impl Folder {
         let file = self.0.join("robot.toml");
         std::fs::write(&file, text).unwrap();
         let found = check(&file, None, &LoadOptions::default()).into_iter();
-        found.filter(|f| f.severity != "note" && f.code != "missing-mesh").map(|f| (f.code, f.message)).collect()
+        found
+            .filter(|f| f.severity != flexarm::Severity::Note && f.code != "missing-mesh")
+            .map(|f| (f.code, f.message))
+            .collect()
     }
 
     fn tries(&self, sound: &str, slips: &[(&str, &str, &str, &str)]) {

@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::errors::{LoadError, ModellingError, PoseError, StepError, ValueError};
+use flexarm::errors::StepError;
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, UrdfEntry, reduce};
 use flexarm::links::{JobError, LinkError};
 use flexarm::motions::AppliedLoad;
@@ -33,17 +33,14 @@ fn refused(modelling: Modelling, change: impl FnOnce(&mut RunOptions)) -> Error 
 #[test]
 fn a_number_that_makes_no_sense_is_a_value_with_what_is_expected() {
     let error = refused(Modelling::default(), |options| options.step_s = 2.0);
-    assert!(
-        matches!(error, Error::Value(ValueError::StepBeyondMotion { step_s, duration_s }) if (step_s, duration_s) == (2.0, 1.0))
-    );
+    assert!(matches!(error, Error::Value(_)));
     assert_eq!(error.to_string(), "the step (step_s 2 s) is longer than the motion (1 s)");
     assert_eq!(error.fault(), Fault::Input);
     let error = refused(Modelling::default(), |options| options.log_rate_hz = -1.0);
-    assert!(matches!(error, Error::Value(ValueError::LogRate(hz)) if hz == -1.0));
+    assert_eq!(error.to_string(), "log_rate_hz: the log rate must be positive, found -1 Hz");
     let error = refused(Modelling::default(), |options| options.magnification = Some(1e9));
-    assert!(
-        matches!(error, Error::Value(ValueError::MagnificationRange { found, most, .. }) if (found, most) == (1e9, 1e6))
-    );
+    let text = "the factor of deflections (magnification) is 1e9: expected one from 0.001 to 1000000";
+    assert!(error.to_string().starts_with(text), "{error}");
 }
 
 #[test]
@@ -61,7 +58,10 @@ fn an_unstable_step_tells_the_largest_stable_one_and_what_to_set() {
 fn a_model_that_no_link_has_is_told_with_the_count_that_was_asked_for() {
     let modal = Modelling { links: LinkModel::Modal, ..Modelling::default() };
     let error = refused(Modelling { segments: Some(3), ..modal }, |_| {});
-    assert!(matches!(error, Error::Modelling(ModellingError::NoLumpedLink { segments: 3, .. })), "{error}");
+    assert!(
+        matches!(error, Error::Modelling(_)) && error.to_string().starts_with("3 segments are requested"),
+        "{error}"
+    );
     assert!(error.to_string().ends_with(": add links lumped"), "{error}");
     let spook = SpookSettings { form: ConstraintForm::Local, preset: SpookPreset::Exact };
     let error = refused(modal, |options| options.stepper = StepperKind::Spook(spook));
@@ -75,16 +75,14 @@ fn poses_loads_and_responses_name_joint_frame_and_bound() {
     let modelling = Modelling::default();
     let joints = robot.rigid_model().unwrap().n_actuated();
     let error = robot.model(&modelling).unwrap().modes(Some(&vec![0.0; joints + 1]), None, 3).unwrap_err();
-    assert!(
-        matches!(&error, Error::Pose(PoseError::Count { found, joints: known }) if *found == joints + 1 && known.len() == joints)
-    );
+    let text = format!("{} joint values given, the robot has {joints} movable joints: [", joints + 1);
+    assert!(matches!(error, Error::Pose(_)) && error.to_string().starts_with(&text), "{error}");
     let error = robot.model(&modelling).unwrap().modes(Some(&vec![f64::NAN; joints]), None, 3).unwrap_err();
-    assert!(matches!(error, Error::Pose(PoseError::NotFinite { value, .. }) if value.is_nan()));
+    assert!(error.to_string().ends_with("at NaN is at no finite number"), "{error}");
     let error = AppliedLoad::sampled("tcp", &[0.0, 0.0], &[Wrench::zeros(), Wrench::zeros()]).err().unwrap();
-    assert!(matches!(error, Error::Load(LoadError::Samples { times: 2, wrenches: 2 })));
+    assert!(matches!(error, Error::Load(_)) && error.to_string().contains("2 times"), "{error}");
     let request = ResponseRequest { points: 1, ..ResponseRequest::default() };
     let error = robot.model(&modelling).unwrap().response(None, &request).unwrap_err();
-    assert!(matches!(error, Error::Value(ValueError::Points { found: 1, least: 2, most: 100_000 })), "{error}");
     assert_eq!(error.to_string(), "points must lie between 2 and 100000, found 1");
 }
 

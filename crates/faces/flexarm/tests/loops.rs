@@ -63,7 +63,7 @@ fn the_palletiser_stands_and_holds_as_its_parallelograms_say() {
 #[test]
 fn the_palletiser_as_shipped_has_no_warnings() {
     let findings = check(&project("robots/palletiser/robot.toml"), None, &LoadOptions::default());
-    let loud: Vec<_> = findings.iter().filter(|f| f.severity != "note").collect();
+    let loud: Vec<_> = findings.iter().filter(|f| f.severity != flexarm::Severity::Note).collect();
     assert!(loud.is_empty(), "{loud:#?}");
 }
 

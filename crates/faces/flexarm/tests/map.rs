@@ -285,30 +285,33 @@ fn what_cannot_be_mapped_is_refused_with_its_cause() {
     let robot = robot("kr210");
     let error = |request: &MapRequest| {
         let error = refused(&robot, request);
-        error.external::<MapError>().unwrap_or_else(|| panic!("{error}")).clone()
+        assert!(matches!(error.external(), Some(MapError::Input(_))), "{error}");
+        error.to_string()
     };
-    assert!(matches!(error(&over(vec![joint("joint_9", [0.0, 1.0], 3)])), MapError::Joint { .. }));
-    assert!(matches!(error(&over(vec![])), MapError::NoJoints));
+    assert!(error(&over(vec![joint("joint_9", [0.0, 1.0], 3)])).contains("there is no joint \"joint_9\" to vary"));
+    assert!(error(&over(vec![])).contains("no joint is given"));
     let twice = vec![joint("joint_1", [0.0, 1.0], 3), joint("joint_1", [0.0, 1.0], 3)];
-    assert!(matches!(error(&over(twice)), MapError::JointTwice(_)));
-    assert!(matches!(error(&over(vec![joint("joint_1", [0.0, f64::NAN], 3)])), MapError::JointRange { .. }));
+    assert!(error(&over(twice)).contains("is named twice"));
+    assert!(error(&over(vec![joint("joint_1", [0.0, f64::NAN], 3)])).contains("has a range from 0 to NaN"));
     let many = ["joint_1", "joint_2", "joint_3"].map(|name| joint(name, [-1.0, -0.5], 1000)).to_vec();
-    assert!(matches!(error(&over(many)), MapError::TooMany { .. }));
+    assert!(error(&over(many)).contains("at most 1e6 are held in memory"));
     let workspace = |workspace| MapRequest { region: MapRegion::Workspace(workspace), ..MapRequest::default() };
-    assert!(matches!(error(&workspace(grid([[1.0; 3], [0.0; 3]], 0.1))), MapError::Bounds { .. }));
-    assert!(matches!(error(&workspace(grid([[0.0; 3], [1.0; 3]], 0.0))), MapError::Spacing { .. }));
-    assert!(matches!(error(&workspace(grid([[0.0; 3], [1.0; 3]], 1e-6))), MapError::TooMany { .. }));
-    assert!(matches!(error(&workspace(grid([[9.0; 3], [9.5; 3]], 0.1))), MapError::OutOfReach { .. }));
+    assert!(error(&workspace(grid([[1.0; 3], [0.0; 3]], 0.1))).contains("must have its lower corner first"));
+    assert!(error(&workspace(grid([[0.0; 3], [1.0; 3]], 0.0))).contains("must be positive, found 0 m"));
+    assert!(error(&workspace(grid([[0.0; 3], [1.0; 3]], 1e-6))).contains("at most 1e6 are held in memory"));
+    assert!(error(&workspace(grid([[9.0; 3], [9.5; 3]], 0.1))).contains("is within reach"));
     let tool = ToolDirections { axis: [0.0; 3], ..ToolDirections::default() };
-    assert!(matches!(error(&workspace(WorkspaceGrid { tool, ..WorkspaceGrid::default() })), MapError::ToolAxis { .. }));
+    assert!(
+        error(&workspace(WorkspaceGrid { tool, ..WorkspaceGrid::default() })).contains("must be finite and non-zero")
+    );
     let by = MapRequest { by: Some("sagg_m".into()), ..MapRequest::default() };
-    assert!(error(&by).to_string().contains("sag_m"));
+    assert!(error(&by).contains("sag_m"));
     let piece = MapRequest { workpiece_m: Some([0.1; 3]), ..over(vec![joint("joint_1", [0.0, 1.0], 3)]) };
-    assert!(matches!(error(&piece), MapError::WorkpieceWithoutGrid));
+    assert!(error(&piece).contains("a workpiece requires a grid"));
     let stopped = map(&robot, &MapRequest::default(), &mut |_, _| ControlFlow::Break(())).unwrap_err();
     assert_eq!(stopped.fault(), Fault::Run);
     let planar = Robot::load(root().join("robots/palletiser")).unwrap();
-    assert!(matches!(refused(&planar, &MapRequest::default()).external(), Some(MapError::TooFewJoints { .. })));
+    assert!(refused(&planar, &MapRequest::default()).to_string().contains("reaching a TCP pose requires six"));
 }
 
 fn end_mill() -> CuttingTool {
@@ -371,7 +374,7 @@ fn a_tool_that_cannot_be_judged_is_refused_before_the_map_is_taken() {
     let tool = Some(CuttingTool::load(&path).unwrap().at_speeds(vec![8000.0]));
     let error = refused(&robot, &MapRequest { tool, region, ..MapRequest::default() });
     std::fs::remove_dir_all(&folder).unwrap();
-    assert!(matches!(error.external(), Some(MapError::NothingToCompare { by }) if by == "depth_m"), "{error}");
+    assert!(error.to_string().contains("none of the poses has a depth_m"), "{error}");
     assert!(error.to_string().contains("feed"), "{error}");
 }
 
@@ -397,7 +400,7 @@ fn a_map_of_listed_poses_has_the_compliance_of_statics_at_each() {
     assert_eq!(named, [[0.5, (-90.0_f64).to_radians(), 0.0, 0.0, 0.0, 0.25]]);
     for (name, text, words) in [
         ("d.csv", "joint_9\n1\n", "joint_9"),
-        ("e.csv", "joint_1,joint_2\n1,1e9\n", "line 2"),
+        ("e.csv", "joint_1,joint_2\n1,1e9\n", "e.csv:2:1: "),
         ("f.csv", "joint_1\n", "no pose"),
         ("g.toml", "format = 1\nposes = [[1.0]]\n", "expected 6"),
     ] {

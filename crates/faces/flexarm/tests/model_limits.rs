@@ -61,7 +61,7 @@ fn rigid_parts_that_do_not_converge_to_their_casting_are_a_caveat_of_every_verb(
     let robot = Robot::load(shipped("kr210")).unwrap();
     let parts = |n: usize| Modelling { links: LinkModel::Lumped, segments: Some(n), ..Modelling::default() };
     let said =
-        |caveats: &[Caveat]| caveats.iter().find(|c| c.code == "parts-off" && c.location.contains("link_3")).cloned();
+        |caveats: &[Finding]| caveats.iter().find(|c| c.code == "parts-off" && c.location.contains("link_3")).cloned();
     let arm = robot.model(&parts(8)).unwrap();
     let q = robot.start_pose().unwrap();
     let found = said(&arm.statics(None, [0.0; 6]).unwrap().caveats).unwrap();

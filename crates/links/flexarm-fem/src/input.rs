@@ -12,7 +12,7 @@ use std::path::Path;
 /// it has more bytes.
 pub fn read_file(path: &Path, largest: u64) -> std::io::Result<Vec<u8>> {
     if !std::fs::metadata(path)?.is_file() {
-        return Err(std::io::Error::other("this is not a file"));
+        return Err(std::io::Error::other("this is not a file; give the path of a regular one"));
     }
     let mut bytes = Vec::new();
     // One byte more than allowed, to detect a larger file.
@@ -32,7 +32,9 @@ mod tests {
     fn only_files_are_read_and_only_up_to_a_size() {
         let folder = std::env::temp_dir();
         assert!(read_file(&folder, 1000).unwrap_err().to_string().contains("not a file"));
-        assert!(read_file(Path::new("/dev/null"), 1000).unwrap_err().to_string().contains("not a file"));
+        assert!(
+            read_file(Path::new("/dev/null"), 1000).unwrap_err().to_string().contains("give the path of a regular one")
+        );
         let path = folder.join(format!("flexarm-input-{}", std::process::id()));
         std::io::Write::write_all(&mut File::create_new(&path).unwrap(), &[7; 1000]).unwrap();
         assert_eq!(read_file(&path, 1000).unwrap().len(), 1000);

@@ -14,7 +14,6 @@ use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::chain::Chain;
-use crate::doubt::Doubt;
 use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
@@ -26,6 +25,7 @@ use crate::reduction::{
 };
 use crate::rigid_part::RigidPart;
 use crate::sparse::{ModesWanted, SparseSymmetric};
+use flexarm_settings::Finding;
 
 /// Source of the masses of the two parts.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,7 +65,7 @@ pub struct MatrixReduction {
     /// Frequencies of the two rigid parts with their joint, A clamped, Hz.
     pub lumped_frequencies_hz: Vec<f64>,
     /// Warnings about accepted but suspicious input.
-    pub doubts: Vec<Doubt>,
+    pub doubts: Vec<Finding>,
 }
 
 /// Reduces a full model to some of its own DoF, six per interface, in order.
@@ -122,7 +122,7 @@ pub fn link_from_superelement(
     let frames = LinkFrames::new(element.interfaces[0].X_LI, element.interfaces[1].X_LI);
     let mut doubts = Vec::new();
     let (p, said) = split_point(&frames, &K12, plan.split, &|_| true);
-    doubts.extend(said.map(|said| Doubt::from_message("split", said)));
+    doubts.extend(said.map(|said| Finding::warning("split", "", said, "")));
     let frames = frames.with_split(Pose::translation(p.x, p.y, p.z));
 
     let whole = match &plan.masses {
@@ -138,10 +138,12 @@ pub fn link_from_superelement(
     let parts = match &plan.masses {
         PartMasses::Given(parts) => parts.clone(),
         _ => {
-            doubts.push(Doubt::from_message(
+            doubts.push(Finding::warning(
                 "halves",
+                "",
                 "the masses of the two parts are the halves of a uniform bar with the mass, centre of mass and \
                  inertia of the link: a matrix does not say where the mass sits; give the parts if they are known",
+                "",
             ));
             halves_of_bar(&whole, &frames.p_AB())
         }
@@ -150,13 +152,13 @@ pub fn link_from_superelement(
     let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
     if has_mass && held_frequencies_hz.is_empty() {
         let said = "the mass matrix is not positive definite: no frequencies, the modal link cannot be used";
-        doubts.push(Doubt::from_message("mass", said));
+        doubts.push(Finding::warning("mass", "", said, ""));
     }
     if has_mass && let PartMasses::Given(_) | PartMasses::Whole(_) = plan.masses {
         let found = condensed_body(&element).mass;
         if (found / whole.mass - 1.0).abs() > 0.01 {
             let said = format!("the mass matrix says {found:.6} kg, the given masses sum to {:.6} kg", whole.mass);
-            doubts.push(Doubt::found("mass", found, whole.mass, said));
+            doubts.push(Finding::warning("mass", "", said, "").measured(found, whole.mass));
         }
     }
     let lumped = Chain { joints: vec![link.split.clone()], parts: vec![link.proximal.clone(), link.distal.clone()] };
@@ -164,7 +166,7 @@ pub fn link_from_superelement(
     if has_mass {
         link.details = Some(Box::new(LinkDetails { superelement: Some(element), ..LinkDetails::default() }));
     }
-    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::from_message("gate", said)));
+    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Finding::warning("gate", "", said, "")));
     Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts })
 }
 

@@ -3,10 +3,10 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::doubt::Doubt;
 use crate::element::{edges, jacobian_range};
 use crate::mesh::{ElementKind, Mesh};
 use crate::order_check::OrderCheck;
+use flexarm_settings::Finding;
 
 /// One mode with A clamped and B free, frequencies of the mesh and of the reduced models, Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -196,11 +196,11 @@ impl MeshGate {
     pub const LARGEST_OFFSET: f64 = 0.35;
 
     /// Returns warnings about results that pass but are suspicious.
-    pub fn doubts(&self) -> Vec<Doubt> {
+    pub fn doubts(&self) -> Vec<Finding> {
         let mut doubts = Vec::new();
         let mut see = |code: &'static str, value: f64, usual: f64, bad: bool, sentence: String| {
             if bad {
-                doubts.push(Doubt::found(code, value, usual, sentence));
+                doubts.push(Finding::warning(code, "", sentence, "").measured(value, usual));
             }
         };
         let (residual, usual) = (self.rigid_body_residual, Self::RIGID_BODY_RESIDUAL);
@@ -222,7 +222,7 @@ impl MeshGate {
 
 impl ElementQuality {
     /// Warnings about folded, flat or bent elements.
-    fn doubts(&self) -> Vec<Doubt> {
+    fn doubts(&self) -> Vec<Finding> {
         let mut doubts = Vec::new();
         let (value, usual) = (self.smallest_at_nodes, MeshGate::SMALLEST_JACOBIAN);
         if value < usual {
@@ -230,7 +230,7 @@ impl ElementQuality {
                 "element {} is nearly folded: its Jacobian at a node is {value:.3} of its mean, usual is above {usual}",
                 self.worst_element
             );
-            doubts.push(Doubt::found("folded-element", value, usual, said));
+            doubts.push(Finding::warning("folded-element", "", said, "").measured(value, usual));
         }
         let (value, usual) = (self.smallest_fullness, MeshGate::SMALLEST_FULLNESS);
         // One sliver among thousands of elements stiffens only its neighbourhood.
@@ -240,7 +240,7 @@ impl ElementQuality {
                  shape with such edges, usual is above {usual}; such slivers are far too stiff: mesh anew, or optimise the mesh",
                 self.flat_elements, self.flattest_element
             );
-            doubts.push(Doubt::found("sliver", value, usual, said));
+            doubts.push(Finding::warning("sliver", "", said, "").measured(value, usual));
         }
         let (value, usual) = (self.largest_offset, MeshGate::LARGEST_OFFSET);
         if value > usual {
@@ -248,7 +248,7 @@ impl ElementQuality {
                 "a mid-side node of element {} is off the middle of its edge by {value:.2} of the edge's length, usually below {usual}: is it in the wrong place, or the mesh too coarse for the curve?",
                 self.bent_element
             );
-            doubts.push(Doubt::found("mid-side-node", value, usual, said));
+            doubts.push(Finding::warning("mid-side-node", "", said, "").measured(value, usual));
         }
         doubts
     }

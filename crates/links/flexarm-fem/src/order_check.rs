@@ -22,12 +22,12 @@ use std::collections::HashSet;
 use nalgebra::{DMatrix, Matrix3};
 use serde::{Deserialize, Serialize};
 
-use crate::doubt::Doubt;
 use crate::element::Quadrature;
 use crate::mesh::{Mesh, added_nodes, promoted, skin};
 use crate::model::{AssemblyError, AssemblyOptions, FeModel};
 use crate::reduction::{Condensation, Interface, Tie};
 use crate::sparse::{SparseSymmetric, gram};
+use flexarm_settings::Finding;
 
 /// Maximum number of nodes of the larger space; above it the stiffness would take gigabytes.
 const MAX_NODES: usize = 600_000;
@@ -57,7 +57,7 @@ impl OrderCheck {
     }
 
     /// Warning if the worst ratio is out of bounds.
-    pub fn doubt(&self) -> Option<Doubt> {
+    pub fn doubt(&self) -> Option<Finding> {
         let worst = self.worst();
         if worst < Self::LARGEST_RATIO && worst > 1.0 / Self::LARGEST_RATIO {
             return None;
@@ -75,7 +75,7 @@ impl OrderCheck {
             list.join(", "),
             100.0 * (worst - 1.0)
         );
-        Some(Doubt::found("first-order", worst, Self::LARGEST_RATIO, said))
+        Some(Finding::warning("first-order", "", said, "").measured(worst, Self::LARGEST_RATIO))
     }
 }
 

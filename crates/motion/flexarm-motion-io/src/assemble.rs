@@ -1,11 +1,11 @@
 //! Builds curves from the messages of a topic: choice of the clock, removal of unusable samples,
 //! choice of velocities.
 
-use flexarm_settings::Caveat;
+use flexarm_settings::Finding;
 use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError, velocity_mismatch};
 
 use crate::collect::{Received, Series, Topic};
-use crate::error::{PlacedProblem, Problem, list};
+use crate::error::{PlacedProblem, list};
 use crate::message::Point;
 
 /// Stamps that go back by at most this are sorted (s).
@@ -38,7 +38,7 @@ struct Line {
 pub(crate) struct Assembled {
     pub(crate) trajectory: Trajectory,
     pub(crate) samples: usize,
-    pub(crate) caveats: Vec<Caveat>,
+    pub(crate) caveats: Vec<Finding>,
 }
 
 /// Builds the curves of a topic.
@@ -69,16 +69,16 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
 /// Collects caveats about one file.
 struct FileCaveats<'a> {
     file: &'a str,
-    caveats: Vec<Caveat>,
+    caveats: Vec<Finding>,
 }
 
 impl FileCaveats<'_> {
     fn warn(&mut self, code: &str, message: &str, help: &str) {
-        self.caveats.push(Caveat::from_message(code, self.file, format!("{}: {message}", self.file), help));
+        self.caveats.push(Finding::warning(code, self.file, format!("{}: {message}", self.file), help));
     }
 
     fn note(&mut self, code: &str, message: &str) {
-        self.caveats.push(Caveat::from_message(code, self.file, format!("{}: {message}", self.file), "").as_note());
+        self.caveats.push(Finding::warning(code, self.file, format!("{}: {message}", self.file), "").as_note());
     }
 }
 
@@ -188,7 +188,7 @@ fn states(mut topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> R
     }
     topic.series.retain(|series| !series.position.is_empty());
     if topic.series.is_empty() {
-        return Err(PlacedProblem::new(Problem::NoPositions));
+        return Err(PlacedProblem::new("no position is a number; was the robot connected when this was recorded?"));
     }
     if not_finite > 0 {
         let what = format!("{not_finite} of {count} positions are not numbers and are skipped; the curves bridge them");
@@ -320,10 +320,14 @@ fn clock(series: &[Series], has_clock: bool, caveats: &mut FileCaveats<'_>) -> R
             caveats.warn("motion-clock", &format!("times are those of reception: {why}"), "");
             Ok(true)
         }
-        (_, false, _) if unset == total && total > series.len() => Err(PlacedProblem::new(Problem::NoStamps)),
-        (_, false, Some((seconds, number, joint))) => {
-            Err(PlacedProblem::new(Problem::StampsJumpBack { seconds, number, joint: joint.to_owned() }))
-        }
+        (_, false, _) if unset == total && total > series.len() => Err(PlacedProblem::new(
+            "the messages have no time stamps (`header`, `stamp`), so nothing says when they were; record with \
+             stamps, or record a bag, which has the times of reception",
+        )),
+        (_, false, Some((seconds, number, joint))) => Err(PlacedProblem::new(format!(
+            "the time stamps jump back by {seconds} s at sample {number} of joint {joint:?}: the text holds two \
+             recordings, or a clock was set; keep one of them"
+        ))),
         (Some(why), false, None) => {
             caveats.warn("motion-clock", &format!("{why}; there is no other time to go by"), "");
             Ok(false)
@@ -390,7 +394,12 @@ fn plans(topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result
         if begin < 0.0 {
             let joint = message.trajectories.first().and_then(|points| points.joints.first());
             let (seconds, joint) = (-begin, joint.map_or_else(String::new, |joint| joint.to_string()));
-            return Err(PlacedProblem::new(Problem::StampsJumpBack { seconds, number: k + 1, joint }));
+            let message = format!(
+                "the time stamps jump back by {seconds} s at sample {number} of joint {joint:?}: the text holds two \
+                 recordings, or a clock was set; keep one of them",
+                number = k + 1
+            );
+            return Err(PlacedProblem::new(message));
         }
         if k == 0 {
             put_start(message, &mut lines, caveats);
@@ -495,7 +504,10 @@ impl Line {
                 let previous = self.q[self.q.len() - 1];
                 if (previous - q).abs() > MEET {
                     let (joint, this) = (self.joint.clone(), q);
-                    return Err(PlacedProblem::new(Problem::SegmentGap { number, joint, this, previous }));
+                    return Err(PlacedProblem::new(format!(
+                        "trajectory {number} has joint {joint:?} at {this} where the one before ends with it at \
+                         {previous}: trajectories of one message run one after another; split the file"
+                    )));
                 }
                 continue;
             }

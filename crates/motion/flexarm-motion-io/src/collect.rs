@@ -3,12 +3,13 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
+use flexarm_settings::Setting;
 use flexarm_trajectory::foreign_joints;
 
 use crate::Request;
 use crate::cdr::{Encoding, decode};
 use crate::definition::{Definitions, plain_name};
-use crate::error::{PlacedProblem, Problem};
+use crate::error::PlacedProblem;
 use crate::message::{Message, Points, State, motion_of};
 use crate::value::Node;
 
@@ -105,7 +106,7 @@ impl<'a> Collector<'a> {
     /// Counts a message and keeps its content. A problem is reported only if the topic is selected.
     ///
     /// # Errors
-    /// [`Problem::TooManyNumbers`].
+    /// More numbers than memory should hold.
     pub(crate) fn bytes(&mut self, index: usize, log_ns: i64, bytes: &[u8]) -> Result<(), PlacedProblem> {
         let Some(topic) = self.topics.get_mut(index) else { return Ok(()) };
         topic.count += 1;
@@ -118,7 +119,7 @@ impl<'a> Collector<'a> {
             Ok(node) => self.node(index, log_ns, &node),
             Err(error) => {
                 let message = topic.message.clone();
-                Err(PlacedProblem::new(Problem::Message { message, what: error.to_string() }))
+                Err(PlacedProblem::new(format!("a message of the type {message} cannot be read: {error}")))
             }
         };
         let topic = &mut self.topics[index];
@@ -126,7 +127,9 @@ impl<'a> Collector<'a> {
             topic.trouble = Some(trouble.in_message(&topic.name, topic.count));
         }
         if self.positions > MAX_POSITIONS {
-            return Err(PlacedProblem::new(Problem::TooManyNumbers { most: MAX_POSITIONS }));
+            return Err(PlacedProblem::new(format!(
+                "more than {MAX_POSITIONS} numbers, the limit; cut the recording, or leave out samples"
+            )));
         }
         Ok(())
     }
@@ -153,33 +156,39 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
+    /// Checks that a requested topic holds messages that can be read.
+    fn check_topic(&self, asked: &str) -> Result<(), PlacedProblem> {
+        let asked_for = |topic: &&Topic| same_topic(asked, &topic.name);
+        let others: Vec<String> =
+            self.topics.iter().filter(|topic| topic.reader.is_some()).map(Topic::described).collect();
+        let fail = |what: &str| {
+            Err(PlacedProblem::new(format!(
+                "the topic {asked:?} ({}) {what}; topics with motions are {readable}",
+                Setting::Topic,
+                readable = joined(&others)
+            )))
+        };
+        match self.topics.iter().find(asked_for) {
+            None => fail("is not in the file"),
+            Some(topic) if topic.reader.is_none() => {
+                fail(&format!("has messages of the type {}, which hold no motion", topic.message))
+            }
+            Some(topic) if topic.count == 0 => fail("has no messages"),
+            Some(_) => Ok(()),
+        }
+    }
+
     /// Returns the selected topic and others that could be selected.
     ///
     /// # Errors
-    /// [`Problem::NoTopic`], [`Problem::Topic`], a problem with a message of the topic, or
-    /// [`Problem::Names`].
+    /// No such topic, no topic with a motion, a problem with a message of the topic, or names that
+    /// do not fit the robot.
     pub(crate) fn choose(mut self) -> Result<(Topic, Vec<String>), PlacedProblem> {
         let all: Vec<String> = self.topics.iter().map(Topic::described).collect();
         let readable = |topics: &[Topic]| -> Vec<String> {
             topics.iter().filter(|topic| topic.has_motion()).map(Topic::described).collect()
         };
-        if let Some(asked) = self.request.topic {
-            let asked_for = |topic: &&Topic| same_topic(asked, &topic.name);
-            let others: Vec<String> =
-                self.topics.iter().filter(|topic| topic.reader.is_some()).map(Topic::described).collect();
-            let fail = |what: &str| {
-                let (asked, what) = (asked.to_owned(), what.to_owned());
-                Err(PlacedProblem::new(Problem::Topic { asked, what, readable: joined(&others) }))
-            };
-            match self.topics.iter().find(asked_for) {
-                None => return fail("is not in the file"),
-                Some(topic) if topic.reader.is_none() => {
-                    return fail(&format!("has messages of the type {}, which hold no motion", topic.message));
-                }
-                Some(topic) if topic.count == 0 => return fail("has no messages"),
-                Some(_) => {}
-            }
-        }
+        self.request.topic.map_or(Ok(()), |asked| self.check_topic(asked))?;
         // Preference: most moving joints, then measured before commanded motion, then most
         // messages.
         let rank = |topic: &Topic| {
@@ -196,7 +205,12 @@ impl<'a> Collector<'a> {
             (topic.has_motion(), rank(topic), usize::MAX - i)
         });
         let Some(best) = best else {
-            return Err(PlacedProblem::new(Problem::NoTopic { found: joined(&all) }));
+            let none = PlacedProblem::new(format!(
+                "no topic holds a motion: read are JointState, JointTrajectory and JointTrajectoryControllerState \
+                 with at least one message; the topics are {found}",
+                found = joined(&all)
+            ));
+            return Err(PlacedProblem { is_without_motion: true, ..none });
         };
         let mut topic = self.topics.swap_remove(best);
         if let Some(trouble) = topic.trouble.take() {
@@ -210,10 +224,10 @@ impl<'a> Collector<'a> {
             names.dedup();
         }
         if names.is_empty() {
-            return Err(PlacedProblem::new(Problem::NoPositions));
+            return Err(PlacedProblem::new("no position is a number; was the robot connected when this was recorded?"));
         }
         if let Some(joints) = self.request.joints {
-            foreign_joints(&names, joints).map_err(|error| PlacedProblem::new(error.into()))?;
+            foreign_joints(&names, joints).map_err(PlacedProblem::new)?;
         }
         let own = topic.described();
         Ok((topic, others.into_iter().filter(|other| *other != own).collect()))

@@ -5,11 +5,11 @@ use std::io::{Read, Seek};
 use std::path::{Path, PathBuf};
 
 use flexarm_files::most_unpacked;
-use flexarm_settings::Caveat;
+use flexarm_settings::Finding;
 
 use crate::assemble::assemble;
 use crate::collect::Collector;
-use crate::error::{MotionError, PlacedProblem, Problem};
+use crate::error::{MotionError, PlacedProblem};
 use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, mcap, sqlite, yaml};
@@ -20,7 +20,7 @@ const MAX_METADATA: u64 = 16 << 20;
 /// Reads a rosbag2 folder.
 ///
 /// # Errors
-/// As [`crate::read_mcap`], and [`Problem::NotABag`].
+/// As [`crate::read_mcap`], and a folder that is not a bag.
 pub fn read_folder(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     let files = files_of(path)?;
     read_files(&files, path, request)
@@ -66,7 +66,12 @@ fn files_of(folder: &Path) -> Result<Vec<PathBuf>, MotionError> {
             found
         }
     };
-    let not_a_bag = |what: String| Err(PlacedProblem::new(Problem::NotABag { what }).of(&origin));
+    let not_a_bag = |what: String| {
+        Err(PlacedProblem::new(format!(
+            "the folder is not a rosbag2 bag: {what}; expected metadata.yaml and files *.mcap or *.db3 in it"
+        ))
+        .of(&origin))
+    };
     let first = files.first().map(|file| stem(file));
     let other = files.iter().find(|file| Some(stem(file)) != first);
     match files.iter().find(|file| !file.is_file()) {
@@ -95,7 +100,7 @@ pub const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
 /// Reads a SQLite file of rosbag2.
 ///
 /// # Errors
-/// As [`crate::read_mcap`]; [`Problem::NotRead`] without the feature `sqlite`.
+/// As [`crate::read_mcap`]; refused without the feature `sqlite`.
 pub fn read_db3(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     read_files(&[path.to_owned()], path, request)
 }
@@ -149,7 +154,7 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
             }
         } else {
             let what = "it is neither MCAP nor a database of rosbag2, by its first bytes".to_owned();
-            return Err(PlacedProblem::new(Problem::NotRead { what }).of(&origin));
+            return Err(PlacedProblem::new(what).of(&origin));
         };
         broken.extend(ended.map(|why| (origin, why)));
     }
@@ -163,19 +168,18 @@ fn finish(
     broken: &[(String, String)],
 ) -> Result<MessageMotion, MotionError> {
     let was_asked = collector.asked();
-    let cut = |trouble: PlacedProblem| match (broken.first(), &*trouble.problem) {
+    let cut = |trouble: PlacedProblem| match broken.first() {
         // The reason for the missing motion is more important.
-        (Some((_, why)), Problem::NoTopic { .. }) => PlacedProblem::new(Problem::Container {
-            container: "bag",
-            what: format!("{why}, and there is no motion before"),
-        }),
+        Some((_, why)) if trouble.is_without_motion => {
+            PlacedProblem::new(format!("the bag cannot be read: {why}, and there is no motion before"))
+        }
         _ => trouble,
     };
     let (topic, others) = collector.choose().map_err(|trouble| cut(trouble).of(shown))?;
-    let mut caveats: Vec<Caveat> = Vec::new();
+    let mut caveats: Vec<Finding> = Vec::new();
     for (file, why) in broken {
         let message = format!("{file}: {why}; it is read up to there ({} messages on {})", topic.count, topic.name);
-        caveats.push(Caveat::from_message("motion-cut", file, message, "recover it, or record it again"));
+        caveats.push(Finding::warning("motion-cut", file, message, "recover it, or record it again"));
     }
     if !was_asked {
         caveats.push(chosen(&topic.described(), &others, shown));
@@ -188,17 +192,17 @@ fn finish(
     Ok(MessageMotion { trajectory, format, topic: Some(name), message, samples, dropped, caveats })
 }
 
-/// Caveat about the selected topic; a warning if there was a choice.
-fn chosen(taken: &str, others: &[String], shown: &str) -> Caveat {
+/// Finding about the selected topic; a warning if there was a choice.
+fn chosen(taken: &str, others: &[String], shown: &str) -> Finding {
     use flexarm_settings::Setting;
     if others.is_empty() {
         let message = format!("{shown}: the motion is that of {taken}, the only topic that has one");
-        return Caveat::from_message("motion-topic", shown, message, "").as_note();
+        return Finding::warning("motion-topic", shown, message, "").as_note();
     }
     let message = format!(
         "{shown}: the motion is that of {taken}; others have one too: {}; {} chooses",
         others.join(", "),
         Setting::Topic
     );
-    Caveat::from_message("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
+    Finding::warning("motion-topic", shown, message, "").mended_by(&[Setting::Topic])
 }

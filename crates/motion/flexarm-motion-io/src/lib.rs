@@ -49,7 +49,7 @@ mod value;
 mod write;
 mod yaml;
 
-pub use error::{FilePosition, MotionError, Problem};
+pub use error::MotionError;
 pub use folder::{SQLITE_MAGIC, read_db3, read_folder, read_mcap, read_packed};
 pub use mcap::MCAP_MAGIC;
 pub use text::{looks_like_messages, read_text};
@@ -62,7 +62,7 @@ pub mod internals {
     pub use crate::definition::{Definitions, Kind, Many};
 }
 
-use flexarm_settings::Caveat;
+use flexarm_settings::Finding;
 use flexarm_trajectory::Trajectory;
 
 /// Selection of the joints and the topic of a file.
@@ -91,5 +91,5 @@ pub struct MessageMotion {
     /// Joints of the messages that were not requested.
     pub dropped: Vec<String>,
     /// Choices, assumptions and dropped content.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }

@@ -3,7 +3,7 @@
 
 use std::rc::Rc;
 
-use crate::error::{NO_POSITIONS, PlacedProblem, Problem};
+use crate::error::{NO_POSITIONS, PlacedProblem, SHORTENED_ARRAY};
 use crate::value::{Node, Value};
 
 /// Maximum depth of a motion in a message.
@@ -132,7 +132,8 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProble
             return Err(wrong("points", item, "a list of points"));
         }
         let of = || format!("point {}", i + 1);
-        let missing = |key, expected| PlacedProblem::at(item.line, Problem::MissingKey { of: of(), key, expected });
+        let missing =
+            |key, expected| PlacedProblem::at(item.line, format!("{of} has no `{key}`; {expected}", of = of()));
         let positions = item.get("positions").or_else(|| item.get("position"));
         let positions = positions.ok_or_else(|| missing("positions", NO_POSITIONS))?;
         let time = item.get("time_from_start");
@@ -151,12 +152,21 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProble
         check_lengths(item, i + 1, joints.len(), &columns)?;
         if let Some(k) = point.position.iter().position(|value| !value.is_finite()) {
             let (joint, value) = (joints[k].to_string(), point.position[k]);
-            return Err(PlacedProblem::at(item.line, Problem::NotFinite { joint, point: i + 1, value }));
+            let message = format!(
+                "joint {joint:?}, point {point}: the position is {value}; expected a finite number",
+                point = i + 1
+            );
+            return Err(PlacedProblem::at(item.line, message));
         }
         let previous = found.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
         if !(point.time_s > previous && point.time_s.is_finite()) {
             let this = point.time_s;
-            return Err(PlacedProblem::at(item.line, Problem::PointTimes { point: i + 1, this, previous }));
+            let message = format!(
+                "point {point} is at {this} s, the one before it at {previous} s: `time_from_start` must increase \
+                 from point to point",
+                point = i + 1
+            );
+            return Err(PlacedProblem::at(item.line, message));
         }
         found.push(point);
     }
@@ -186,12 +196,12 @@ impl State {
     /// another number and returns whether there were any.
     ///
     /// # Errors
-    /// [`Problem::Lengths`].
+    /// A number of values that is not that of the joints.
     pub(crate) fn check(&mut self) -> Result<bool, PlacedProblem> {
         let (found, expected) = (self.position.len(), self.joints.len());
         if found != 0 && found != expected {
-            let (key, hint, point) = ("position".to_owned(), "", None);
-            return Err(PlacedProblem::at(self.line, Problem::Lengths { key, found, expected, hint, point }));
+            let message = format!("`position` has {found} values for {expected} joints; expected one for each name");
+            return Err(PlacedProblem::at(self.line, message));
         }
         let mut is_odd = false;
         for rates in [&mut self.velocity, &mut self.acceleration] {
@@ -213,9 +223,11 @@ fn check_lengths(
     for (key, values, needed) in columns {
         if values.len() != joints && (*needed || !values.is_empty()) {
             let hint = if values.is_empty() { ": a trajectory without positions is not read" } else { "" };
-            let (key, found) = ((*key).to_owned(), values.len());
-            let problem = Problem::Lengths { key, found, expected: joints, hint, point: Some(point) };
-            return Err(PlacedProblem::at(item.line, problem));
+            let found = values.len();
+            let message = format!(
+                "`{key}` has {found} values for {joints} joints; expected one for each name{hint} (point {point})"
+            );
+            return Err(PlacedProblem::at(item.line, message));
         }
     }
     Ok(())
@@ -239,7 +251,10 @@ fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, PlacedProblem> {
     let mut sorted: Vec<&str> = names.iter().map(|name| &**name).collect();
     sorted.sort_unstable();
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-        Some(pair) => Err(PlacedProblem::at(node.line, Problem::RepeatedJoint { joint: pair[0].to_owned() })),
+        Some(pair) => Err(PlacedProblem::at(
+            node.line,
+            format!("joint {joint:?} is named twice in one message; each may be there once", joint = pair[0]),
+        )),
         None => Ok(names),
     }
 }
@@ -277,9 +292,9 @@ fn wrong(key: &str, node: &Node, expected: &'static str) -> PlacedProblem {
     if let Value::Text(text) = &node.value
         && (text.contains("...") || text.starts_with("<sequence type:") || text.starts_with("<array type:"))
     {
-        return PlacedProblem::at(node.line, Problem::ShortenedArray);
+        return PlacedProblem::at(node.line, SHORTENED_ARRAY);
     }
-    PlacedProblem::at(node.line, Problem::Value { key: key.to_owned(), found: node.in_words(), expected })
+    PlacedProblem::at(node.line, format!("`{key}` is {found}; expected {expected}", found = node.in_words()))
 }
 
 /// `header.stamp` in ns since 1970; 0 if missing.

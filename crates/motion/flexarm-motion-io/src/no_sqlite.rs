@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::collect::Collector;
-use crate::error::{MotionError, PlacedProblem, Problem};
+use crate::error::{MotionError, PlacedProblem};
 
 pub(crate) fn collect_file(path: &Path, _: u64, _: &mut Collector<'_>) -> Result<Option<String>, MotionError> {
     Err(refused().of(&path.display().to_string()))
@@ -16,5 +16,5 @@ pub(crate) fn collect_bytes(_: Vec<u8>, _: u64, _: &mut Collector<'_>) -> Result
 fn refused() -> PlacedProblem {
     let what = "it is a SQLite bag, which this build does not read: build flexarm with the feature sqlite, install the Python \
                 package, which reads it, or make an MCAP of it with ros2 bag convert";
-    PlacedProblem::new(Problem::NotRead { what: what.to_owned() })
+    PlacedProblem::new(what)
 }

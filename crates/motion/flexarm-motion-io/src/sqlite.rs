@@ -9,7 +9,7 @@ use std::path::Path;
 use rusqlite::{Connection, OpenFlags};
 
 use crate::collect::Collector;
-use crate::error::{MotionError, PlacedProblem, Problem};
+use crate::error::{MotionError, PlacedProblem};
 use crate::unpack::{MAX_BYTES, ZSTD_MAGIC, unpacked};
 
 /// Collects from a file.
@@ -64,7 +64,7 @@ fn escaped(letter: char) -> String {
 }
 
 fn failed(error: &rusqlite::Error) -> PlacedProblem {
-    PlacedProblem::new(Problem::Container { container: "SQLite file", what: error.to_string() })
+    PlacedProblem::new(format!("the SQLite file cannot be read: {error}"))
 }
 
 fn collect(database: &Connection, most: u64, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
@@ -75,7 +75,7 @@ fn collect(database: &Connection, most: u64, into: &mut Collector<'_>) -> Result
             "it has no tables `topics` and `messages`, so it is not a rosbag2 bag; its tables are {}",
             if tables.is_empty() { "none".to_owned() } else { tables.join(", ") }
         );
-        return Err(PlacedProblem::new(Problem::Container { container: "SQLite file", what }));
+        return Err(PlacedProblem::new(format!("the SQLite file cannot be read: {what}")));
     }
     let definitions = match has("message_definitions") {
         true => definitions(database).unwrap_or_default(),

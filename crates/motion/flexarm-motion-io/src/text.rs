@@ -1,10 +1,10 @@
 //! Messages as text: one document, or several as printed by `ros2 topic echo`.
 
-use flexarm_settings::Caveat;
+use flexarm_settings::{Finding, Setting};
 
 use crate::assemble::assemble;
 use crate::collect::Collector;
-use crate::error::{MotionError, PlacedProblem, Problem};
+use crate::error::{MotionError, PlacedProblem};
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, yaml};
 
@@ -54,11 +54,14 @@ pub fn read_text(text: &str, origin: &str, request: &Request<'_>) -> Result<Mess
 
 fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, PlacedProblem> {
     if let Some(asked) = request.topic {
-        return Err(PlacedProblem::new(Problem::TopicOfText { asked: asked.to_owned() }));
+        return Err(PlacedProblem::new(format!(
+            "a topic was requested ({} {asked:?}), but a text of messages has none; leave it out",
+            Setting::Topic
+        )));
     }
     if text.len() > LONGEST {
-        let mend = "record a bag instead, or cut it";
-        return Err(PlacedProblem::new(Problem::TooLarge { most: LONGEST as u64, mend }));
+        let message = format!("more than {LONGEST} bytes, the limit for such a file; record a bag instead, or cut it");
+        return Err(PlacedProblem::new(message));
     }
     let mut collector = Collector::new(*request);
     let topic = collector.topic("text", "", "", None);
@@ -86,11 +89,16 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
             return Err(trouble);
         }
         let message =
-            format!("{origin}: the last of {documents} documents is not whole and is left out ({})", trouble.problem);
-        caveats.push(Caveat::from_message("motion-cut", origin, message, ""));
+            format!("{origin}: the last of {documents} documents is not whole and is left out ({})", trouble.message);
+        caveats.push(Finding::warning("motion-cut", origin, message, ""));
     }
     if !collector.topics[topic].has_something() {
-        return Err(PlacedProblem::new(Problem::NoMessage { found: keys }));
+        let message = format!(
+            "there is no motion in the text: expected a JointTrajectory (`joint_names` and `points`), a JointState \
+             (`name` and `position`) or the state of a controller (`joint_names` and `reference` or `desired`), at \
+             any depth; its keys are {keys}"
+        );
+        return Err(PlacedProblem::new(message));
     }
     let (topic, _) = collector.choose()?;
     let dropped = topic.foreign.clone();

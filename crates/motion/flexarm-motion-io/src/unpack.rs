@@ -3,7 +3,7 @@
 use std::io::{BufReader, Read};
 use std::path::Path;
 
-use crate::error::{MotionError, PlacedProblem, Problem};
+use crate::error::{MotionError, PlacedProblem};
 use crate::mcap;
 
 /// First bytes of zstd data.
@@ -92,12 +92,12 @@ pub(crate) fn look_inside(path: &Path, most: u64) -> Result<Inside, MotionError>
     if !head.starts_with(crate::SQLITE_MAGIC) {
         let what =
             "its compressed content is neither MCAP nor a rosbag2 database; decompress it to see what it is".to_owned();
-        return Err(PlacedProblem::new(Problem::NotRead { what }).of(&origin));
+        return Err(PlacedProblem::new(what).of(&origin));
     }
     let mut bytes = Vec::new();
     whole.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(failed)?;
     if bytes.len() as u64 > MAX_BYTES {
-        let problem = Problem::TooLarge { most: MAX_BYTES, mend: "unpack it with zstd -d" };
+        let problem = format!("more than {MAX_BYTES} bytes, the limit for such a file; unpack it with zstd -d");
         return Err(PlacedProblem::new(problem).of(&origin));
     }
     Ok(Inside::Database(bytes))

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
 
-use crate::error::{PlacedProblem, Problem};
+use crate::error::PlacedProblem;
 use crate::value::{Node, Value};
 
 /// Maximum number of values of a text, with those behind aliases counted each time.
@@ -24,7 +24,7 @@ pub(crate) fn documents(
 
 impl From<YamlError> for PlacedProblem {
     fn from(YamlError { line, message }: YamlError) -> Self {
-        Self::at(u32::try_from(line).unwrap_or(0), Problem::NotYaml { message })
+        Self::at(u32::try_from(line).unwrap_or(0), format!("the text is neither YAML nor JSON: {message}"))
     }
 }
 

@@ -1,15 +1,16 @@
 //! Errors of trajectories: place, value found, value expected and remedy.
 //!
-//! Each error displays as one line and is a plain enum for programs. A [`FileError`] adds file,
-//! line and column to a [`Problem`]; the other errors have no place in a file.
+//! Each error displays as one line. An error in a file is a [`Finding`] at `file:line:column`; the
+//! other errors have no place in a file.
 
-use std::fmt;
 use std::io;
 use std::path::PathBuf;
 
+use flexarm_settings::Finding;
+
 use crate::curve::LONGEST;
 use crate::polynomial::FARTHEST;
-use crate::problem::{PlanError, Problem, SampleError, list};
+use crate::problem::{PlanError, SampleError, list};
 
 /// Error of reading, planning or writing a trajectory.
 #[derive(Debug, thiserror::Error)]
@@ -33,7 +34,7 @@ pub enum TrajectoryError {
     },
     /// The content of a file is wrong.
     #[error(transparent)]
-    File(#[from] Box<FileError>),
+    File(Box<Finding>),
     /// Sampled values are invalid.
     #[error(transparent)]
     Samples(#[from] SampleError),
@@ -111,45 +112,6 @@ pub enum TrajectoryError {
         #[from]
         source: io::Error,
     },
-}
-
-/// A problem and its place: `arm.csv, line 7, column 3: ...`.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub struct FileError {
-    /// File name, or the caller's name for the text.
-    pub origin: String,
-    /// Line, counted from 1.
-    pub line: Option<usize>,
-    /// TOML: character within the line; CSV: number of the field. Counted from 1.
-    pub column: Option<usize>,
-    /// The problem.
-    pub problem: Problem,
-    /// Other lines that are wrong, ascending.
-    pub more_lines: Vec<usize>,
-}
-
-/// Maximum number of further lines listed in the message.
-const NAMED: usize = 10;
-
-impl fmt::Display for FileError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.origin)?;
-        if let Some(line) = self.line {
-            write!(f, ", line {line}")?;
-        }
-        if let Some(column) = self.column {
-            write!(f, ", column {column}")?;
-        }
-        write!(f, ": {}", self.problem)?;
-        let named: Vec<String> = self.more_lines.iter().take(NAMED).map(usize::to_string).collect();
-        let count = self.more_lines.len();
-        match count {
-            0 => Ok(()),
-            1 => write!(f, " (line {} is wrong, too)", named[0]),
-            _ if count > NAMED => write!(f, " ({count} more lines are wrong: {}, ...)", named.join(", ")),
-            _ => write!(f, " ({count} more lines are wrong: {})", named.join(", ")),
-        }
-    }
 }
 
 fn mismatch(missing: &[String], unknown: &[String]) -> String {

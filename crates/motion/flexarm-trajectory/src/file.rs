@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
 
-use crate::error::{FileError, TrajectoryError};
+use crate::error::TrajectoryError;
 use crate::limits::JointLimits;
 use crate::problem::Problem;
 use crate::trajectory::Trajectory;
@@ -41,7 +41,7 @@ impl Trajectory {
 /// Reads a regular file; refuses devices and pipes, from which a read may never end or never begin.
 fn read(path: &Path) -> std::io::Result<Vec<u8>> {
     if !std::fs::metadata(path)?.is_file() {
-        return Err(Error::other("this is not a file"));
+        return Err(Error::other("this is not a file; give the path of a regular one"));
     }
     let mut bytes = Vec::new();
     File::open(path)?.take(LARGEST + 1).read_to_end(&mut bytes)?;
@@ -82,17 +82,13 @@ pub fn text_of_bytes(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryE
         _ => {
             return match windows_1252(&bytes) {
                 Some(text) => Ok(text),
-                None => Ok(text_of(bytes, origin)?),
+                None => text_of(bytes, origin),
             };
         }
     };
     let words = bytes[2..].chunks_exact(2).map(|pair| word([pair[0], pair[1]]));
     let text: Result<String, _> = char::decode_utf16(words).collect();
-    text.map_err(|_| {
-        let origin = origin.to_owned();
-        Box::new(FileError { origin, line: None, column: None, problem: Problem::NotUtf8, more_lines: Vec::new() })
-            .into()
-    })
+    text.map_err(|_| Problem::not_utf8().at(origin, None, None))
 }
 
 /// Decodes Windows-1252 text without control characters; `None` if the bytes are UTF-8, have
@@ -110,11 +106,10 @@ fn windows_1252(bytes: &[u8]) -> Option<String> {
     if bytes[..error.valid_up_to()].is_ascii() { bytes.iter().map(letter).collect() } else { None }
 }
 
-fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, Box<FileError>> {
+fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryError> {
     String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
-        let (origin, problem, more_lines) = (origin.to_owned(), Problem::NotUtf8, Vec::new());
-        Box::new(FileError { origin, line: Some(line), column: None, problem, more_lines })
+        Problem::not_utf8().at(origin, Some(line), None)
     })
 }

@@ -1,44 +1,20 @@
 //! The rule for names of joints in motion files of all formats: a name close to a joint that the
 //! file does not name is an error; other names that the robot does not have are left out.
 
-use flexarm_settings::{Setting, closest};
+use flexarm_settings::closest;
 
 use crate::problem::list;
 
-/// Names in a motion file that do not fit the robot.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum NameError {
-    /// Name close to that of a joint which the file does not name.
-    #[error("{found:?} is not a joint of the robot; did you mean {meant:?}? rename it{}, or remove it", by_column(column.as_deref(), meant))]
-    Misspelt {
-        /// Name in the file.
-        found: String,
-        /// Joint of the robot.
-        meant: String,
-        /// Column of the name, if the file is a table.
-        column: Option<String>,
-    },
-    /// No name is a joint of the robot.
-    #[error(
-        "none of the names {} is a joint of the robot, which has {}; rename them{}",
-        list(found),
-        list(joints),
-        if *is_table { format!(", or name the columns: {} <joint>=<column>", Setting::Columns) } else { String::new() }
-    )]
-    NoneKnown {
-        /// Names in the file.
-        found: Vec<String>,
-        /// Joints of the robot.
-        joints: Vec<String>,
-        /// Whether the file is a table.
-        is_table: bool,
-    },
+/// Text about a name close to that of a joint which the file does not name; `or` is another remedy.
+pub(crate) fn misspelt_text(found: &str, meant: &str, or: &str) -> String {
+    format!("{found:?} is not a joint of the robot; did you mean {meant:?}? rename it{or}, or remove it")
 }
 
-fn by_column(column: Option<&str>, meant: &str) -> String {
-    column
-        .map_or_else(String::new, |column| format!(", say which column it is ({} {meant}={column})", Setting::Columns))
+/// Text about names of which none is a joint of the robot; `or` is another remedy.
+pub(crate) fn none_known_text(found: &[String], joints: &[&str], or: &str) -> String {
+    let joints: Vec<String> = joints.iter().map(|joint| (*joint).to_owned()).collect();
+    let (found, joints) = (list(found), list(&joints));
+    format!("none of the names {found} is a joint of the robot, which has {joints}; rename them{or}")
 }
 
 /// Returns the names of a motion that the robot does not have, in the order of the file.
@@ -47,17 +23,16 @@ fn by_column(column: Option<&str>, meant: &str) -> String {
 /// * `joints`: joints of the robot.
 ///
 /// # Errors
-/// [`NameError`] for a misspelt name, and if no name is a joint of the robot.
-pub fn foreign_joints(names: &[String], joints: &[&str]) -> Result<Vec<String>, NameError> {
+/// A sentence with the remedy for a misspelt name, and if no name is a joint of the robot.
+pub fn foreign_joints(names: &[String], joints: &[&str]) -> Result<Vec<String>, String> {
     let is_known = |name: &&String| joints.contains(&name.as_str());
     let foreign: Vec<String> = names.iter().filter(|name| !is_known(name)).cloned().collect();
     let unnamed: Vec<&str> = joints.iter().copied().filter(|joint| names.iter().all(|name| name != joint)).collect();
     if let Some((found, meant)) = misspelt(foreign.iter().map(String::as_str), &unnamed) {
-        return Err(NameError::Misspelt { found: found.to_owned(), meant, column: None });
+        return Err(misspelt_text(found, &meant, ""));
     }
     if foreign.len() == names.len() && !names.is_empty() {
-        let joints = joints.iter().map(|joint| (*joint).to_owned()).collect();
-        return Err(NameError::NoneKnown { found: foreign, joints, is_table: false });
+        return Err(none_known_text(&foreign, joints, ""));
     }
     Ok(foreign)
 }

@@ -84,14 +84,14 @@ mod waypoints_write;
 
 pub use column_map::{ColumnMap, ColumnMapError};
 pub use curve::LONGEST;
-pub use error::{FileError, TrajectoryError};
+pub use error::TrajectoryError;
 pub use file::{bytes_of_file, text_of_bytes, text_of_file};
-pub use joint_names::{NameError, foreign_joints};
+pub use joint_names::foreign_joints;
 pub use limits::{JointLimits, LimitKind, LimitViolation};
 pub use noise::Noise;
 pub use peak::{Extreme, JointPeak};
 pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
-pub use problem::{PlanError, Problem, SampleError};
+pub use problem::{MISSING_LIMIT, PlanError, SampleError};
 pub use spline::{JointKnots, JointSamples, Samples, velocity_mismatch};
 pub use table::{KnownJoint, TableInfo, TableRequest};
 pub use trajectory::{Move, Trajectory, VelocityJump};

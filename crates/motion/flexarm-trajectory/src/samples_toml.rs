@@ -89,11 +89,11 @@ pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> 
     };
     made.map_err(|error| {
         let problem = match error {
-            TrajectoryError::Samples(error) => Problem::Samples(error),
-            TrajectoryError::OutOfRange { joint, .. } => Problem::OutOfRange { joint },
-            other => Problem::Toml { message: other.to_string() },
+            TrajectoryError::Samples(error) => error.into(),
+            TrajectoryError::OutOfRange { joint, .. } => Problem::out_of_range(&joint),
+            other => Problem::new("toml", other.to_string()),
         };
-        Located { offset: Some(time.span().start), problem: Box::new(problem) }
+        Located { offset: Some(time.span().start), problem }
     })
 }
 

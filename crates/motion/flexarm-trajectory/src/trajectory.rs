@@ -5,7 +5,7 @@
 //! [`crate::Samples`] and do not change afterwards.
 
 use crate::curve::{Curve, LONGEST, QUIET_SPEED};
-use crate::error::{FileError, TrajectoryError};
+use crate::error::TrajectoryError;
 use crate::polynomial::Piece;
 use crate::problem::{Problem, SampleError};
 use crate::table::request::KnownJoint;
@@ -383,9 +383,16 @@ impl Trajectory {
         let Some(StatedUnit { joint, is_length, line }) = self.stated.iter().find(|stated| contradicts(stated)) else {
             return Ok(());
         };
-        let problem = Problem::UnitOfJoint { joint: joint.clone(), is_length: *is_length };
-        let (origin, more_lines) = (origin.to_owned(), Vec::new());
-        Err(Box::new(FileError { origin, line: Some(*line), column: None, problem, more_lines }).into())
+        let message = match is_length {
+            true => format!(
+                "joint {joint:?} turns, and `metres` names it as one that slides; take it out of `metres`, and give \
+                 its numbers in `unit`"
+            ),
+            false => format!(
+                "joint {joint:?} slides, and its numbers are read as degrees; add {joint:?} to `metres` and give them in m"
+            ),
+        };
+        Err(Problem::new("unit-of-joint", message).at(origin, Some(*line), None))
     }
 
     pub(crate) fn with_stated_units(self, stated: Vec<StatedUnit>) -> Self {

@@ -44,7 +44,7 @@
 //!
 //! Start at [`Trajectory::parse_toml`]. Not here: the mathematics of the moves ([`crate::Plan`]).
 
-use crate::error::{FileError, TrajectoryError};
+use crate::error::TrajectoryError;
 use crate::limits::JointLimits;
 use crate::problem::{PlanError, Problem};
 use crate::samples_toml::{self, SamplesFileToml, has_samples};
@@ -64,33 +64,31 @@ impl Trajectory {
     pub fn parse_toml(text: &str, origin: &str, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
         let fail = |offset: Option<usize>, problem: Problem| {
             let (line, column) = offset.map(|offset| place(text, offset)).unzip();
-            let (origin, more_lines) = (origin.to_owned(), Vec::new());
-            TrajectoryError::from(Box::new(FileError { origin, line, column, problem, more_lines }))
+            problem.at(origin, line, column)
         };
         let unread = |error: toml::de::Error| {
             let message = flexarm_settings::without_types(error.message());
             let message = format!("{message}; docs/motions.md has all keys, with types and units");
-            fail(error.span().map(|span| span.start), Problem::Toml { message })
+            fail(error.span().map(|span| span.start), Problem::new("toml", message))
         };
         let line = |offset: usize| place(text, offset).0;
         if has_samples(text) {
             let file: SamplesFileToml = toml::from_str(text).map_err(unread)?;
             if *file.format.get_ref() != 1 {
-                return Err(fail(Some(file.format.span().start), Problem::Format { found: *file.format.get_ref() }));
+                return Err(fail(Some(file.format.span().start), Problem::format(*file.format.get_ref())));
             }
-            let read = samples_toml::trajectory(&file).map_err(|error| fail(error.offset, *error.problem))?;
+            let read = samples_toml::trajectory(&file).map_err(|error| fail(error.offset, error.problem))?;
             return Ok(read.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)));
         }
         let file: FileToml = toml::from_str(text).map_err(unread)?;
 
-        let Checked { plan, move_offsets } =
-            check(&file, limits).map_err(|error| fail(error.offset, *error.problem))?;
+        let Checked { plan, move_offsets } = check(&file, limits).map_err(|error| fail(error.offset, error.problem))?;
         let planned = plan.build().map_err(|error| match error {
             TrajectoryError::Plan(error) => {
                 let offset = PlanError::move_number(&error).and_then(|number| move_offsets.get(number - 1).copied());
-                fail(offset, Problem::Plan(error))
+                fail(offset, error.into())
             }
-            TrajectoryError::OutOfRange { joint, .. } => fail(None, Problem::OutOfRange { joint }),
+            TrajectoryError::OutOfRange { joint, .. } => fail(None, Problem::out_of_range(&joint)),
             other => other,
         })?;
         Ok(planned.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)))

@@ -4,6 +4,7 @@
 //! Start at [`check`]. The plan makes the remaining checks (missing limits, repeated points) and
 //! reports the number of the move.
 
+use std::fmt::Display;
 use std::ops::Range;
 
 use toml::Spanned;
@@ -22,7 +23,7 @@ const DEFAULT_ROUNDING: f64 = 0.1;
 /// A problem and its byte offset in the file.
 pub(crate) struct Located {
     pub(crate) offset: Option<usize>,
-    pub(crate) problem: Box<Problem>,
+    pub(crate) problem: Problem,
 }
 
 /// The plan and the offset of each move in the text.
@@ -32,18 +33,18 @@ pub(crate) struct Checked {
 }
 
 fn located(span: Range<usize>, problem: Problem) -> Located {
-    Located { offset: Some(span.start), problem: Box::new(problem) }
+    Located { offset: Some(span.start), problem: problem }
 }
 
-pub(crate) fn bad_value(span: Range<usize>, key: &str, found: impl ToString, expected: &'static str) -> Located {
-    located(span, Problem::Value { key: key.to_owned(), found: found.to_string(), expected })
+pub(crate) fn bad_value(span: Range<usize>, key: &str, found: impl Display, expected: &'static str) -> Located {
+    located(span, Problem::value(key, found, expected))
 }
 
 /// Converts and checks the file.
 pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Checked, Located> {
     let format = *file.format.get_ref();
     if format != 1 {
-        return Err(located(file.format.span(), Problem::Format { found: format }));
+        return Err(located(file.format.span(), Problem::format(format)));
     }
     let joints = joint_names(&file.joints)?;
     let context = Context { file, scales: scales(&file.unit, &file.metres, &joints)?, joints };
@@ -88,8 +89,7 @@ pub(crate) fn scales(
         "rad" => 1.0,
         "deg" => std::f64::consts::PI / 180.0,
         found => {
-            let problem = Problem::UnknownUnit { key: "unit", found: found.to_owned(), accepted: "\"rad\", \"deg\"" };
-            return Err(located(unit.span(), problem));
+            return Err(located(unit.span(), Problem::unknown_unit("unit", found, "\"rad\", \"deg\"")));
         }
     };
     for entry in metres {
@@ -122,8 +122,7 @@ pub(crate) fn stated_units(
 }
 
 fn unknown_joint(entry: &Spanned<String>, key: &'static str, joints: &[String]) -> Located {
-    let problem = Problem::UnknownJoint { key, name: entry.get_ref().clone(), joints: joints.to_vec() };
-    located(entry.span(), problem)
+    located(entry.span(), Problem::unknown_joint(key, entry.get_ref(), joints))
 }
 
 /// Data shared by all moves.
@@ -149,13 +148,14 @@ impl Context<'_> {
     }
 
     fn out_of_range(&self, span: Range<usize>, joint: usize) -> Located {
-        located(span, Problem::OutOfRange { joint: self.joints[joint].clone() })
+        located(span, Problem::out_of_range(&self.joints[joint]))
     }
 
     fn list(&self, list: &[f64], span: Range<usize>, key: &'static str) -> Result<Vec<f64>, Located> {
         if list.len() != self.joints.len() {
             let (found, expected) = (list.len(), self.joints.len());
-            return Err(located(span, Problem::ListLength { key: key.to_owned(), found, expected }));
+            let message = format!("`{key}` has {found} entries; expected {expected}, one for each of `joints`");
+            return Err(located(span, Problem::new("list-length", message)));
         }
         match list.iter().find(|value| !value.is_finite()) {
             Some(value) => Err(bad_value(span, key, value, "finite numbers")),

@@ -3,16 +3,15 @@
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 
-use flexarm_trajectory::{
-    FileError, NameError, Plan, PlannedMove, Problem, SampleError, Trajectory, TrajectoryError, Warning,
-};
+use flexarm_settings::Finding;
+use flexarm_trajectory::{Plan, PlannedMove, Trajectory, TrajectoryError, Warning};
 use proptest::prelude::*;
 
 fn parse(text: &str) -> Trajectory {
     Trajectory::parse_csv(text, "arm.csv").unwrap()
 }
 
-fn problem(text: &str) -> FileError {
+fn problem(text: &str) -> Finding {
     match Trajectory::parse_csv(text, "arm.csv") {
         Err(TrajectoryError::File(error)) => *error,
         other => panic!("expected an error with a place in the file, got {other:?}"),
@@ -146,57 +145,52 @@ fn degrees_metres_comments_and_a_late_first_time_are_understood() {
 #[test]
 fn angles_of_more_than_two_turns_need_a_unit() {
     let text = "time,q\n0,0\n1,0\n2,90\n3,90\n";
-    assert!(matches!(problem(text).problem, Problem::UnitNeeded { .. }));
+    assert_eq!(problem(text).code, "unit-needed");
     assert_eq!(parse(&format!("# unit: deg\n{text}")).warnings(), []);
     assert_eq!(parse(&format!("# unit: rad\n{text}")).warnings(), []);
 }
 
 #[test]
 fn each_fault_of_a_file_is_named_with_its_place() {
-    type Check = fn(&Problem) -> bool;
-    let cases: [(&str, Option<usize>, Option<usize>, Check); 18] = [
-        ("", None, None, |p| matches!(p, Problem::Empty)),
-        ("# only\n\n# comments\n", None, None, |p| matches!(p, Problem::Empty)),
-        ("q,w\n0,1\n", Some(1), None, |p| matches!(p, Problem::NoTimeColumn { .. })),
-        ("time,q,q\n0,1,2\n", Some(1), Some(3), |p| matches!(p, Problem::RepeatedColumn { .. })),
-        ("time,q,w.vel\n0,1,2\n", Some(1), Some(3), |p| matches!(p, Problem::NoPositionColumn { .. })),
-        ("time,q,q.acc\n0,1,2\n1,2,3\n", Some(1), Some(3), |p| {
-            matches!(p, Problem::Samples(SampleError::AccelerationWithoutVelocity { .. }))
-        }),
-        ("time\n0\n1\n", Some(1), None, |p| matches!(p, Problem::Names(NameError::NoneKnown { .. }))),
-        ("time,q\n", Some(1), None, |p| matches!(p, Problem::Samples(SampleError::TooFew { found: 0 }))),
-        ("time,q\n0,1\n", Some(1), None, |p| matches!(p, Problem::Samples(SampleError::TooFew { found: 1 }))),
-        ("time,q\n0,1\n\n1\n", Some(4), None, |p| matches!(p, Problem::Ragged { found: 1, expected: 2 })),
-        ("time,q\n0,1\n1,2,3\n", Some(3), None, |p| matches!(p, Problem::Ragged { found: 3, expected: 2 })),
-        ("time,q\n0,1\n1,x\n", Some(3), Some(2), |p| matches!(p, Problem::NotANumber { .. })),
-        ("time,q\n0,1\n1,NaN\n", Some(3), Some(2), |p| matches!(p, Problem::NotANumber { .. })),
-        ("time,q\n0,1\ninf,1\n", Some(3), Some(1), |p| matches!(p, Problem::NotANumber { .. })),
-        (
-            "q,time\n1,0\n2,1\n# a comment\n3,1\n",
-            Some(5),
-            Some(2),
-            |p| matches!(p, Problem::Samples(SampleError::TimeNotIncreasing { previous, this, .. }) if *previous == 1.0 && *this == 1.0),
-        ),
-        ("# unit: grad\ntime,q\n0,1\n1,2\n", Some(1), None, |p| matches!(p, Problem::UnknownUnit { key: "unit", .. })),
-        ("# time: ms\ntime,q\n0,1\n1,2\n", Some(1), None, |p| matches!(p, Problem::UnknownUnit { key: "time", .. })),
-        ("time,q\n0,0\n1e-300,1e300\n", Some(2), None, |p| matches!(p, Problem::OutOfRange { .. })),
+    // text, place after the name of the file, code, part of the message
+    let cases = [
+        ("", "", "empty", "the file is empty"),
+        ("# only\n\n# comments\n", "", "empty", "the file is empty"),
+        ("q,w\n0,1\n", ":1", "no-time-column", "\"q\", \"w\""),
+        ("time,q,q\n0,1,2\n", ":1:8", "repeated-column", "as column 2 is"),
+        ("time,q,w.vel\n0,1,2\n", ":1:8", "no-position-column", "\"w\""),
+        ("time,q,q.acc\n0,1,2\n1,2,3\n", ":1:8", "samples", "has accelerations but no velocities"),
+        ("time\n0\n1\n", ":1", "no-joint", "none of the names \"time\""),
+        ("time,q\n", ":1", "samples", "0 rows of samples"),
+        ("time,q\n0,1\n", ":1", "samples", "1 rows of samples"),
+        ("time,q\n0,1\n\n1\n", ":4", "ragged", "the row has 1 fields, the header 2;"),
+        ("time,q\n0,1\n1,2,3\n", ":3", "ragged", "the row has 3 fields, the header 2;"),
+        ("time,q\n0,1\n1,x\n", ":3:3", "not-a-number", "q: \"x\""),
+        ("time;\"a;b\";q\n0;0;1\n1;\"1\";x\n", ":3:7", "not-a-number", "q: \"x\""),
+        ("time   q\n0  1\n1   x\n", ":3:5", "not-a-number", "q: \"x\""),
+        ("time,q\n0,1\n1,NaN\n", ":3:3", "not-a-number", "q: \"NaN\""),
+        ("time,q\n0,1\ninf,1\n", ":3:1", "not-a-number", "time: \"inf\""),
+        ("q,time\n1,0\n2,1\n# a comment\n3,1\n", ":5:3", "samples", "time 1 s does not follow 1 s"),
+        ("# unit: grad\ntime,q\n0,1\n1,2\n", ":1", "unknown-unit", "`unit`"),
+        ("# time: ms\ntime,q\n0,1\n1,2\n", ":1", "unknown-unit", "`time`"),
+        ("time,q\n0,0\n1e-300,1e300\n", ":2", "out-of-range", "joint \"q\""),
     ];
-    for (text, line, column, is_right) in cases {
+    for (text, place, code, message) in cases {
         let error = problem(text);
-        assert!(is_right(&error.problem), "{text:?}: {error:?}");
-        assert_eq!((error.line, error.column), (line, column), "{text:?}: {error}");
+        assert_eq!((&*error.location, &*error.code), (&*format!("arm.csv{place}"), code), "{text:?}: {error}");
+        assert!(error.message.contains(message), "{text:?}: {error}");
         assert_eq!(error.to_string().lines().count(), 1);
     }
     let text = "# unit: deg\n# unit: rad\ntime,q\n0,1\n1,2\n";
-    assert!(matches!(problem(text).problem, Problem::ContradictingUnits { .. }));
+    assert_eq!(problem(text).code, "contradicting-units");
     let text = "# metres: z\ntime,q\n0,1\n1,2\n";
-    assert!(matches!(problem(text).problem, Problem::UnknownJoint { .. }));
+    assert_eq!(problem(text).code, "unknown-joint");
 }
 
 #[test]
 fn a_message_tells_place_finding_and_remedy_in_one_line() {
     let message = problem("time,q\n0.0,1\n0.2,1\n0.1,1\n").to_string();
-    let truth = "arm.csv, line 4, column 1: time 0.1 s does not follow 0.2 s; times must increase from row to row: \
+    let truth = "arm.csv:4:1: time 0.1 s does not follow 0.2 s; times must increase from row to row: \
                  sort the rows and remove repeated ones";
     assert_eq!(message, truth);
 }
@@ -233,7 +227,7 @@ fn rows_that_repeat_the_one_before_are_left_out_and_counted() {
 #[test]
 fn every_bad_line_is_named_up_to_ten() {
     let message = problem("time,q\n0,0\n1,x\n2,0\n3\n4,0\n5,y\n").to_string();
-    let truth = "arm.csv, line 3, column 2: ";
+    let truth = "arm.csv:3:3: ";
     assert!(message.starts_with(truth) && message.ends_with(" (2 more lines are wrong: 5, 7)"), "{message}");
     let message = problem("time,q\n0,0\n1,x\n2,x\n").to_string();
     assert!(message.ends_with(" (line 4 is wrong, too)"), "{message}");
@@ -241,7 +235,7 @@ fn every_bad_line_is_named_up_to_ten() {
     let message = problem(&format!("time,q\n{many}")).to_string();
     assert!(message.ends_with(" (39 more lines are wrong: 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, ...)"), "{message}");
     let message = problem("time,q\n0,0\n1,1\n1,2\n2,3\n0.5,4\n1.5,5\n3,6\n").to_string();
-    assert!(message.starts_with("arm.csv, line 4, column 1: time 1 s does not follow 1 s"), "{message}");
+    assert!(message.starts_with("arm.csv:4:1: time 1 s does not follow 1 s"), "{message}");
     assert!(message.ends_with(" (2 more lines are wrong: 6, 7)"), "{message}");
 }
 
@@ -249,8 +243,7 @@ fn every_bad_line_is_named_up_to_ten() {
 fn times_and_positions_beyond_any_motion_are_refused_with_their_line() {
     for (text, line) in [("0,0\n1,1\n1e300,2\n", 4), ("0,0\n1,1\n2e7,2\n", 4), ("0,0\n1,1e12\n2,0\n", 2)] {
         let error = problem(&format!("time,q\n{text}"));
-        assert!(matches!(error.problem, Problem::OutOfRange { .. }), "{error}");
-        assert_eq!(error.line, Some(line), "{error}");
+        assert_eq!((&*error.code, error.location.clone()), ("out-of-range", format!("arm.csv:{line}")), "{error}");
         assert!(error.to_string().contains("1e9 rad or m and 1e7 s at most"), "{error}");
     }
 }

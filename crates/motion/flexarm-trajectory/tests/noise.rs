@@ -157,7 +157,7 @@ fn a_cut_off_beyond_half_the_sampling_rate_is_refused_with_its_line() {
         [("7 Hz", "less than half the sampling rate, 5.0000 Hz"), ("0 Hz", "more than 0"), ("3", "20 Hz")]
     {
         let error = Trajectory::parse_csv(&text(cutoff), "f").unwrap_err().to_string();
-        assert!(error.starts_with("f, line 2: ") && error.contains(part), "{error}");
+        assert!(error.starts_with("f:2: ") && error.contains(part), "{error}");
     }
     assert!(Trajectory::parse_csv(&text("3 Hz"), "f").is_ok());
 }

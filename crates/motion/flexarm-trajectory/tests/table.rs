@@ -222,50 +222,38 @@ fn what_is_assumed_or_left_out_is_told() {
 #[test]
 fn what_a_table_leaves_open_is_refused_with_its_place() {
     let cases = [
-        (
-            "t;joint_1\n0;0\n1;90\n",
-            "f, line 1, column 2: joint \"joint_1\" reaches 90.0000 in a table that does not state its unit",
-        ),
+        ("t;joint_1\n0;0\n1;90\n", "f:1:3: joint \"joint_1\" reaches 90.0000 in a table that does not state its unit"),
         (
             "time,joint_1,joint_2\n0,00,1,5,2,5\n0,01,1,6,2,6\n",
-            "f, line 2: the row has 6 fields, the header 3: twice as many, as if numbers had decimal commas",
+            "f:2: the row has 6 fields, the header 3: twice as many, as if numbers had decimal commas",
         ),
-        ("Time[s],joint_1[deg]\n0,00,1,5\n", "f, line 2: the row has 4 fields, the header 2: twice as many"),
-        (
-            "t[s];joint_1[deg]\n0,5;1\n1.5;2\n",
-            "f, line 3: numbers have decimal points (line 3) and decimal commas (line 2)",
-        ),
-        ("t[s];joint_1[deg]\n0;1.234,5\n1;2\n", "f, line 2, column 2: joint_1[deg]: \"1.234,5\" is not a number"),
-        ("t[s];joint_1[deg]\n0;\n1;2\n", "f, line 2, column 2: joint_1[deg]: \"\" is not a number"),
-        ("a;joint_1[deg]\n0;1\n1;2\n", "f, line 1: no column of the header \"a\", \"joint_1[deg]\" is a time"),
+        ("Time[s],joint_1[deg]\n0,00,1,5\n", "f:2: the row has 4 fields, the header 2: twice as many"),
+        ("t[s];joint_1[deg]\n0,5;1\n1.5;2\n", "f:3: numbers have decimal points (line 3) and decimal commas (line 2)"),
+        ("t[s];joint_1[deg]\n0;1.234,5\n1;2\n", "f:2:3: joint_1[deg]: \"1.234,5\" is not a number"),
+        ("t[s];joint_1[deg]\n0;\n1;2\n", "f:2:3: joint_1[deg]: \"\" is not a number"),
+        ("a;joint_1[deg]\n0;1\n1;2\n", "f:1: no column of the header \"a\", \"joint_1[deg]\" is a time"),
         (
             "t;time;joint_1[deg]\n0;0;1\n1;1;2\n",
-            "f, line 1: the columns \"t\", \"time\" are all times; name the one that counts: columns t=<column>",
+            "f:1: the columns \"t\", \"time\" are all times; name the one that counts: columns t=<column>",
         ),
         (
             "t[s];x;y\n0;1;1\n1;2;2\n",
-            "f, line 1: none of the names \"t[s]\", \"x\", \"y\" is a joint of the robot, which has \"joint_1\", \"joint_2\", \"rail\"",
+            "f:1: none of the names \"t[s]\", \"x\", \"y\" is a joint of the robot, which has \"joint_1\", \"joint_2\", \"rail\"",
         ),
-        ("0 1 2\n1 2 3\n", "f, line 1: the table has 3 columns of numbers and no header"),
-        ("t[s];joint_1[%]\n0;1\n1;2\n", "f, line 1, column 2: \"joint_1[%]\" is not a joint"),
+        ("0 1 2\n1 2 3\n", "f:1: the table has 3 columns of numbers and no header"),
+        ("t[s];joint_1[%]\n0;1\n1;2\n", "f:1:6: \"joint_1[%]\" is not a joint"),
         (
             "t[s];rail[deg]\n0;1\n1;2\n",
-            "f, line 1: the column \"rail[deg]\" has the unit of an angle; expected a length: the joint is prismatic",
+            "f:1: the column \"rail[deg]\" has the unit of an angle; expected a length: the joint is prismatic",
         ),
         (
             "t[s];joint_1[mm]\n0;1\n1;2\n",
-            "f, line 1: the column \"joint_1[mm]\" has the unit of a length; expected an angle: the joint turns",
+            "f:1: the column \"joint_1[mm]\" has the unit of a length; expected an angle: the joint turns",
         ),
-        (
-            "# unit: rad\nt[s];joint_1[deg]\n0;1\n1;2\n",
-            "f, line 2, column 2: `unit` is stated twice, as \"rad\" and as \"deg\"",
-        ),
-        ("t[s];joint_1[deg]\n0;1\n0;2\n", "f, line 3, column 1: time 0 s does not follow 0 s"),
-        (
-            "t[s];joint_1[deg];joint_1 (rad)\n0;1;1\n1;2;2\n",
-            "f, line 1, column 3: the column is called \"joint_1\", as column 2 is",
-        ),
-        ("t[s];joint_1[deg]\n0;1\n1\n2;3\n", "f, line 3: the row has 1 fields, the header 2"),
+        ("# unit: rad\nt[s];joint_1[deg]\n0;1\n1;2\n", "f:2:6: `unit` is stated twice, as \"rad\" and as \"deg\""),
+        ("t[s];joint_1[deg]\n0;1\n0;2\n", "f:3:1: time 0 s does not follow 0 s"),
+        ("t[s];joint_1[deg];joint_1 (rad)\n0;1;1\n1;2;2\n", "f:1:19: the column is called \"joint_1\", as column 2 is"),
+        ("t[s];joint_1[deg]\n0;1\n1\n2;3\n", "f:3: the row has 1 fields, the header 2"),
         ("", "f: the file is empty"),
     ];
     for (text, expected) in cases {
@@ -334,10 +322,10 @@ fn a_table_in_the_letters_of_old_windows_is_text() {
 fn every_bad_line_of_a_table_is_named() {
     let text = "t[s];a[rad]\n0;0\n1;x\n2;0\n3;y;4\n4;0\n";
     let message = Trajectory::parse_table(text, "t", &TableRequest::default()).unwrap_err().to_string();
-    assert!(message.starts_with("t, line 3, column 2: ") && message.ends_with(" (line 5 is wrong, too)"), "{message}");
+    assert!(message.starts_with("t:3:3: ") && message.ends_with(" (line 5 is wrong, too)"), "{message}");
     let text = "t[s];a[rad]\n0;0\n1;1\n1;2\n2;0\n1;1\n";
     let message = Trajectory::parse_table(text, "t", &TableRequest::default()).unwrap_err().to_string();
-    assert!(message.starts_with("t, line 4, column 1: ") && message.ends_with(" (line 6 is wrong, too)"), "{message}");
+    assert!(message.starts_with("t:4:1: ") && message.ends_with(" (line 6 is wrong, too)"), "{message}");
 }
 
 #[test]
@@ -473,7 +461,8 @@ fn a_misspelt_joint_is_an_error_whatever_the_separator_and_a_gripper_is_left_out
         for (time, unit) in [("time", ""), ("t[s]", "[rad]")] {
             let named = |joint: &str| format!("{joint}{unit}");
             let error = table(separator, &[time, &named("joint_1"), &named("jiont_2")]).unwrap_err().to_string();
-            assert!(error.contains("line 1, column 3") && error.contains("did you mean \"joint_2\"?"), "{error}");
+            let place = format!("f:1:{}: ", time.len() + named("joint_1").len() + 3);
+            assert!(error.starts_with(&place) && error.contains("did you mean \"joint_2\"?"), "{error}");
             assert!(error.contains(&format!("columns joint_2=jiont_2{unit}")), "{error}");
             let error = table(separator, &[time, &named("joint_1"), &named("Joint_1.vel")]).unwrap_err().to_string();
             assert!(error.contains("did you mean \"joint_1\"?"), "{error}");

@@ -4,7 +4,8 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use approx::assert_relative_eq;
-use flexarm_trajectory::{FileError, JointLimits, PlanError, Problem, Trajectory, TrajectoryError};
+use flexarm_settings::Finding;
+use flexarm_trajectory::{JointLimits, Trajectory, TrajectoryError};
 use proptest::prelude::*;
 
 const HEAD: &str = "format = 1\nunit = \"deg\"\njoints = [\"a\", \"b\"]\nstart = [0, 10.0]\n";
@@ -13,7 +14,7 @@ fn parse(text: &str) -> Trajectory {
     Trajectory::parse_toml(text, "arm.toml", &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
 }
 
-fn fault(text: &str) -> FileError {
+fn fault(text: &str) -> Finding {
     match Trajectory::parse_toml(text, "arm.toml", &[]) {
         Err(TrajectoryError::File(error)) => *error,
         other => panic!("expected an error with a place in the file, got {other:?}\n{text}"),
@@ -96,63 +97,60 @@ fn every_profile_can_be_chosen_per_move() {
 
 #[test]
 fn each_fault_of_a_file_is_named_with_its_place() {
-    type Check = fn(&Problem) -> bool;
     let good_move = "[[move]]\nto = [1, 2]\nduration = 1\n";
     let replaced = |from: &str, to: &str| format!("{}{good_move}", HEAD.replace(from, to));
-    let value: Check = |p| matches!(p, Problem::Value { .. });
-    let toml: Check = |p| matches!(p, Problem::Toml { .. });
-    let cases: Vec<(String, (usize, usize), Check)> = vec![
-        (replaced("format = 1", "format = 2"), (1, 10), |p| matches!(p, Problem::Format { found: 2 })),
-        (replaced("format = 1\n", ""), (1, 1), toml),
-        (replaced("\"deg\"", "\"gon\""), (2, 8), |p| matches!(p, Problem::UnknownUnit { .. })),
-        (replaced("[\"a\", \"b\"]", "[]"), (3, 10), value),
-        (replaced("\"b\"", "\"a\""), (3, 16), value),
-        (replaced("10.0", "10.0, 3"), (4, 9), |p| matches!(p, Problem::ListLength { found: 3, expected: 2, .. })),
-        (replaced("10.0", "nan"), (4, 9), value),
-        (replaced("10.0", "\"10\""), (4, 13), toml),
-        (replaced("unit", "metres = [\"c\"]\nunit"), (2, 11), |p| matches!(p, Problem::UnknownJoint { .. })),
-        (replaced("unit", "sped = 0.5\nunit"), (2, 1), toml),
-        (replaced("unit", "speed = 50\nunit"), (2, 9), value),
-        (replaced("unit", "profile = \"cubic\"\nunit"), (2, 11), toml),
-        (replaced("unit", "acceleration = -1\nunit"), (2, 16), value),
-        (replaced("unit", "jerk = [1]\nunit"), (2, 8), |p| matches!(p, Problem::ListLength { .. })),
-        (replaced("unit", "rounding = 1.5\nunit"), (2, 12), value),
-        (format!("{HEAD}[limits]\nc = {{}}\n{good_move}"), (6, 1), |p| matches!(p, Problem::UnknownJoint { .. })),
-        (format!("{HEAD}[limits]\na = {{ velocity = 0 }}\n{good_move}"), (6, 18), value),
-        (format!("{HEAD}[limits]\na = {{ torque = 1 }}\n{good_move}"), (6, 7), toml),
-        (format!("{HEAD}[[move]]\nto = [1]\nduration = 1"), (6, 6), |p| matches!(p, Problem::ListLength { .. })),
-        (format!("{HEAD}[[move]]\nto = {{ c = 1 }}\nduration = 1"), (6, 8), |p| {
-            matches!(p, Problem::UnknownJoint { .. })
-        }),
-        (format!("{HEAD}[[move]]\nto = 1\nduration = 1"), (6, 6), value),
-        (format!("{HEAD}[[move]]\nto = [1, 2]\nduration = 0"), (7, 12), value),
-        (format!("{HEAD}[[move]]\nto = [1, 2]\nhold = -1"), (7, 8), value),
-        (format!("{HEAD}[[move]]\nto = [1, 2]"), (5, 1), |p| {
-            matches!(p, Problem::Plan(PlanError::MissingLimit { .. }))
-        }),
-        (format!("{HEAD}[[move]]\nto = [1, 2]\nvia = [[0, 10]]\nduration = 1"), (5, 1), |p| {
-            matches!(p, Problem::Plan(PlanError::RepeatedPoint { number: 1, via: 1 }))
-        }),
-        (format!("{HEAD}[[move]]\nto = [1, 2]\nvia = [[9, 9]]\nduration = 1\nprofile = \"trapezoid\""), (5, 1), |p| {
-            matches!(p, Problem::Plan(PlanError::ViaNeedsQuintic { number: 1 }))
-        }),
-        (format!("{HEAD}[[move]]\nto = [1, 2\n"), (6, 11), toml),
+    let cases: Vec<(String, (usize, usize), &str)> = vec![
+        (replaced("format = 1", "format = 2"), (1, 10), "format: format 2 is not known"),
+        (replaced("format = 1\n", ""), (1, 1), "toml"),
+        (replaced("\"deg\"", "\"gon\""), (2, 8), "unknown-unit"),
+        (replaced("[\"a\", \"b\"]", "[]"), (3, 10), "value"),
+        (replaced("\"b\"", "\"a\""), (3, 16), "value"),
+        (replaced("10.0", "10.0, 3"), (4, 9), "list-length: `start` has 3 entries; expected 2"),
+        (replaced("10.0", "nan"), (4, 9), "value"),
+        (replaced("10.0", "\"10\""), (4, 13), "toml"),
+        (replaced("unit", "metres = [\"c\"]\nunit"), (2, 11), "unknown-joint"),
+        (replaced("unit", "sped = 0.5\nunit"), (2, 1), "toml"),
+        (replaced("unit", "speed = 50\nunit"), (2, 9), "value"),
+        (replaced("unit", "profile = \"cubic\"\nunit"), (2, 11), "toml"),
+        (replaced("unit", "acceleration = -1\nunit"), (2, 16), "value"),
+        (replaced("unit", "jerk = [1]\nunit"), (2, 8), "list-length"),
+        (replaced("unit", "rounding = 1.5\nunit"), (2, 12), "value"),
+        (format!("{HEAD}[limits]\nc = {{}}\n{good_move}"), (6, 1), "unknown-joint"),
+        (format!("{HEAD}[limits]\na = {{ velocity = 0 }}\n{good_move}"), (6, 18), "value"),
+        (format!("{HEAD}[limits]\na = {{ torque = 1 }}\n{good_move}"), (6, 7), "toml"),
+        (format!("{HEAD}[[move]]\nto = [1]\nduration = 1"), (6, 6), "list-length"),
+        (format!("{HEAD}[[move]]\nto = {{ c = 1 }}\nduration = 1"), (6, 8), "unknown-joint"),
+        (format!("{HEAD}[[move]]\nto = 1\nduration = 1"), (6, 6), "value"),
+        (format!("{HEAD}[[move]]\nto = [1, 2]\nduration = 0"), (7, 12), "value"),
+        (format!("{HEAD}[[move]]\nto = [1, 2]\nhold = -1"), (7, 8), "value"),
+        (format!("{HEAD}[[move]]\nto = [1, 2]"), (5, 1), "missing-limit: move 1 has no duration"),
+        (
+            format!("{HEAD}[[move]]\nto = [1, 2]\nvia = [[0, 10]]\nduration = 1"),
+            (5, 1),
+            "plan: move 1: point 1 on the way",
+        ),
+        (
+            format!("{HEAD}[[move]]\nto = [1, 2]\nvia = [[9, 9]]\nduration = 1\nprofile = \"trapezoid\""),
+            (5, 1),
+            "plan: move 1 passes points",
+        ),
+        (format!("{HEAD}[[move]]\nto = [1, 2\n"), (6, 11), "toml"),
     ];
-    for (text, place, is_right) in cases {
+    for (text, place, found) in cases {
         let error = fault(&text);
-        assert!(is_right(&error.problem), "{text}\n{error:?}");
-        assert_eq!((error.line, error.column), (Some(place.0), Some(place.1)), "{text}\n{error}");
+        assert_eq!(error.location, format!("arm.toml:{}:{}", place.0, place.1), "{text}\n{error}");
+        assert!(format!("{}: {}", error.code, error.message).starts_with(found), "{text}\n{error:?}");
         assert_eq!(error.to_string().lines().count(), 1, "{error}");
     }
 
     let error = fault(&format!("{HEAD}move = []"));
-    assert!(matches!(error.problem, Problem::Plan(PlanError::NothingHappens)));
+    assert!(error.message.starts_with("nothing moves and nothing is held"), "{error}");
     let error = fault(&format!("{HEAD}[[move]]\nto = [1e308, 2]\nduration = 1e-300"));
-    assert!(matches!(error.problem, Problem::OutOfRange { .. }));
+    assert_eq!(error.code, "out-of-range");
     // The duration is infinite because of a tiny velocity limit; the other joint does not move at
     // all.
     let text = format!("{HEAD}[limits]\na = {{ velocity = 1e-308 }}\n[[move]]\nto = {{ a = 1e300 }}\n");
-    assert!(matches!(fault(&text).problem, Problem::OutOfRange { .. }));
+    assert_eq!(fault(&text).code, "out-of-range");
 }
 
 /// Truth by hand: one joint with a seven-phase S-curve, v/a + a/j + L/v; of two joints one is
@@ -218,7 +216,7 @@ fn numbers_beyond_any_motion_are_refused_with_their_place() {
         ("to = { b = 1e12 }\nduration = 1", "joint \"b\": values or times are too extreme"),
     ] {
         let fault = fault(&format!("{HEAD}[[move]]\n{moves}"));
-        assert!(fault.line.is_some() && fault.to_string().contains(key), "{fault}");
+        assert!(fault.location.starts_with("arm.toml:") && fault.to_string().contains(key), "{fault}");
     }
 }
 
@@ -226,9 +224,9 @@ fn numbers_beyond_any_motion_are_refused_with_their_place() {
 fn a_message_tells_place_finding_and_remedy_in_one_line() {
     let message = fault(&HEAD.replace("\"deg\"", "\"degrees\"")).to_string();
     // The first error here is that no move follows.
-    assert!(message.starts_with("arm.toml, line 1, column 1: missing field `move`"), "{message}");
+    assert!(message.starts_with("arm.toml:1:1: missing field `move`"), "{message}");
     let text = format!("{}[[move]]\nto = [1, 2]\n", HEAD.replace("\"deg\"", "\"degrees\""));
-    let truth = "arm.toml, line 2, column 8: unit \"degrees\" of `unit` is not known; accepted: \"rad\", \"deg\"";
+    let truth = "arm.toml:2:8: unit \"degrees\" of `unit` is not known; accepted: \"rad\", \"deg\"";
     assert_eq!(fault(&text).to_string(), truth);
 }
 
@@ -247,7 +245,7 @@ fn the_ending_of_the_name_chooses_the_reader() {
     assert_eq!(Trajectory::from_path(&samples, &[]).unwrap().duration(), 2.0);
     let latin = write("b.csv", b"time,q\n0,0\n\xfc,1\n");
     let message = Trajectory::from_path(&latin, &[]).unwrap_err().to_string();
-    assert!(message.ends_with("b.csv, line 3: the file is not UTF-8 text; save it as UTF-8"), "{message}");
+    assert!(message.ends_with("b.csv:3: the file is not UTF-8 text; save it as UTF-8"), "{message}");
     let unknown = Trajectory::from_path(Path::new("a.xlsx"), &[]);
     assert!(matches!(unknown, Err(TrajectoryError::UnknownExtension { .. })));
     assert!(matches!(Trajectory::from_path(&folder.join("none.csv"), &[]), Err(TrajectoryError::Read { .. })));

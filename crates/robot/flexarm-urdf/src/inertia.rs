@@ -11,14 +11,13 @@
 //! principal moment.
 
 use flexarm_kinematics::{LinkInertia, Pose, SpatialInertia, moment_floor};
+use flexarm_settings::{Finding, Setting};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::error::Problem;
-use crate::finding::TextPosition;
 use crate::mesh::MassProperties;
 use crate::raw::{RawInertial, RawLink, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
-use crate::report::Report;
+use crate::report::{Report, quoted};
 use crate::shapes::{LinkShape, NoEstimate};
 use crate::tree::Body;
 
@@ -60,7 +59,9 @@ pub(crate) fn link_inertias(
             continue;
         }
         if raw.mass < 0.0 {
-            report.error(&raw.place, Problem::NegativeMass { link: link.name.clone(), mass: raw.mass });
+            let message = format!("link {:?} has the mass {} kg, expected a positive one", link.name, raw.mass);
+            let help = "correct the sign; a counterweight has positive mass too";
+            report.error(&raw.place, "negative-mass", message, help);
             continue;
         }
         if raw.mass == 0.0 && !link.visuals.is_empty() {
@@ -136,75 +137,98 @@ fn check_moments(
     let moments @ [low, middle, high] = principal_moments(&inertia.inertia_com);
     let scale = low.abs().max(high.abs());
     let waived = options.waive.iter().any(|n| n == name);
-    let link = name.to_owned();
     let excess = high - (low + middle);
     let floor = moment_floor(raw.mass, scale);
-    let problem = if low.is_nan() || low < -floor {
+    let found = moments.map(|m| format!("{m:.6e}")).join(", ");
+    let (code, message, help) = if low.is_nan() || low < -floor {
         // no waiver for moving links: a negative moment would add energy
-        Problem::InertiaNotPositiveDefinite { link, moments }
+        (
+            "inertia-not-positive-definite",
+            format!("the inertia of link {name:?} is not positive definite: principal moments {found} kg m^2"),
+            "check signs, units (kg m^2) and that the values are about the centre of mass".into(),
+        )
     } else if excess > floor && !waived {
-        Problem::TriangleInequality { link, moments, excess }
+        (
+            "triangle-inequality",
+            format!(
+                "the inertia of link {name:?} breaks the triangle inequality: principal moments {found} kg m^2, the \
+                 largest is above the sum of the two others by {excess:.2e}"
+            ),
+            format!(
+                "check the order ixx ixy ixz iyy iyz izz and that the values are about the centre of mass; if the \
+                 model means it, waive the check by {} LINK, or waive_inertia = [\"link\"] in the robot file",
+                Setting::WaiveInertia
+            ),
+        )
     } else {
         return low <= TOLERANCE * scale || high <= floor;
     };
     // Without motion the inertia has no effect.
-    if !moves && waived {
-        return false;
-    }
     if moves {
-        report.error(&raw.place, problem);
-    } else {
-        report.warning(&raw.place, problem.code(), problem.to_string(), problem.help());
+        report.error(&raw.place, code, message, help);
+        if code == "triangle-inequality" {
+            report.waivable.push(name.to_owned());
+        }
+    } else if !waived {
+        report.warning(&raw.place, code, message, help);
     }
     false
 }
 
 /// Warns about joints that move no mass, whose inertia is missing in the results. Many such joints
 /// give one warning.
-fn tell_massless(robot: &RawRobot, massless: Vec<(TextPosition, Problem)>, report: &mut Report) {
+fn tell_massless(robot: &RawRobot, massless: Vec<(&str, Finding)>, report: &mut Report) {
     const MAX: usize = 3;
     if massless.len() <= MAX {
-        for (place, problem) in massless {
-            report.warning(&place, problem.code(), problem.to_string(), problem.help());
-        }
+        report.take(massless.into_iter().map(|(_, warning)| warning));
         return;
     }
-    let name = |problem: &Problem| match problem {
-        Problem::MissingInertial { link, .. } | Problem::ZeroMass { link, .. } => link.clone(),
-        _ => String::new(),
-    };
-    let names: Vec<String> = massless.iter().map(|(_, problem)| name(problem)).collect();
-    let shown = names.iter().take(6).map(|n| format!("{n:?}")).collect::<Vec<_>>().join(", ");
-    let rest = if names.len() > 6 { format!(" and {} more", names.len() - 6) } else { String::new() };
-    let message = format!("{} moving links have no mass: {shown}{rest}", names.len());
-    let (_, first) = &massless[0];
-    report.warning(&robot.place, "missing-inertial", message, first.help());
+    let shown = quoted(massless.iter().take(6).map(|(link, _)| *link));
+    let rest = if massless.len() > 6 { format!(" and {} more", massless.len() - 6) } else { String::new() };
+    let message = format!("{} moving links have no mass: {shown}{rest}", massless.len());
+    report.warning(&robot.place, "missing-inertial", message, &massless[0].1.help);
 }
 
-/// Checks mass and inertia of a moving body; returns a problem if they are missing entirely.
-fn check_body(
-    robot: &RawRobot,
+/// Remedy for a moving link without `<inertial>`.
+fn estimate_help() -> String {
+    format!(
+        "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in \
+         the robot file): without them the link needs no force to move, and nothing bends under it",
+        Setting::InertiaFromDensity,
+        Setting::InertiaFromTotalMass
+    )
+}
+
+/// Checks mass and inertia of a moving body; returns its link and a warning if they are missing
+/// entirely.
+fn check_body<'r>(
+    robot: &'r RawRobot,
     body: &Body,
     inertias: &[Option<LinkInertia>],
     without_extent: &[bool],
     failures: &[Option<NoEstimate>],
     options: &ReadOptions,
     report: &mut Report,
-) -> Option<(TextPosition, Problem)> {
-    let joint = body.moved_by.map(|j| robot.joints[j].urdf.name.clone())?;
+) -> Option<(&'r str, Finding)> {
+    let joint = &robot.joints[body.moved_by?].urdf.name;
     let root = &robot.links[body.root];
-    let link = root.name.clone();
-    let lumped = || body.members[1..].iter().map(|&(i, _)| robot.links[i].name.clone()).collect();
+    let link = &root.name;
+    let lumped = match &body.members[1..] {
+        [] => String::new(),
+        fixed => {
+            format!(", nor have the links fixed to it ({})", quoted(fixed.iter().map(|m| &*robot.links[m.0].name)))
+        }
+    };
     let with_inertia: Vec<usize> = body.members.iter().map(|m| m.0).filter(|&i| inertias[i].is_some()).collect();
     if with_inertia.is_empty() {
-        let no_estimate = body.members.iter().find_map(|&(i, _)| failures[i].as_ref()).map(NoEstimate::to_string);
-        let asked = no_estimate.is_some();
-        let problem = Problem::MissingInertial { link, joint, lumped: lumped(), no_estimate };
-        if asked {
-            report.error(&root.place, problem);
+        let code = "missing-inertial";
+        let message = format!("link {link:?} is moved by joint {joint:?} and has no <inertial>{lumped}");
+        if let Some(why) = body.members.iter().find_map(|&(i, _)| failures[i].as_ref()) {
+            let help = format!("add <inertial> with mass and inertia; it could not be estimated: {why}");
+            report.error(&root.place, code, message, help);
             return None;
         }
-        return Some((root.place.clone(), problem));
+        return Some((link, Finding::warning(code, root.place.to_string(), message, estimate_help())));
     }
     // Unreadable or negative masses were reported already; consequences are not.
     let unsound = |&i: &usize| robot.links[i].inertial.as_ref().is_some_and(|raw| raw.faulty || raw.mass < 0.0);
@@ -219,7 +243,10 @@ fn check_body(
     }
     let place = |i: usize| robot.links[i].inertial.as_ref().map_or(&robot.links[i].place, |raw| &raw.place);
     if M_R.mass == 0.0 {
-        return Some((place(with_inertia[0]).clone(), Problem::ZeroMass { link, joint, lumped: lumped() }));
+        let message = format!("link {link:?} is moved by joint {joint:?} and has no mass{lumped}");
+        let help =
+            "give the link its mass and inertia: without them it needs no force to move, and nothing bends under it";
+        return Some((link, Finding::warning("zero-mass", place(with_inertia[0]).to_string(), message, help)));
     }
 
     // A point mass is valid if other links of the same body have inertia.
@@ -284,7 +311,9 @@ fn fill_from_shapes(
         InertiaEstimate::TotalMass(mass) => ("the total mass", mass),
     };
     if !(value > 0.0 && value.is_finite()) {
-        report.error(&robot.place, Problem::BadEstimate { what, value });
+        let message = format!("inertia from meshes was requested with {what} {value}, expected a positive number");
+        let help = "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg";
+        report.error(&robot.place, "bad-estimate", message, help);
         return failures;
     }
 

@@ -6,11 +6,10 @@ use flexarm_kinematics::{Joint, JointKind, Limits, Mimic, Pose};
 use nalgebra::{Rotation3, Translation3, Unit, Vector3};
 use urdf_rs::JointType;
 
-use crate::error::Problem;
-use crate::finding::TextPosition;
 use crate::lint::RATES;
+use crate::place::TextPosition;
 use crate::raw::{RawJoint, RawRobot};
-use crate::report::Report;
+use crate::report::{Report, did_you_mean, quoted};
 use flexarm_settings::closest;
 
 /// Tolerance of the axis length; axes written with four digits of 1/√2 pass without a warning.
@@ -83,7 +82,12 @@ fn convert(raw: &RawJoint, report: &mut Report) -> Joint {
     match &raw.limit {
         Some(place) => joint.limits = limits(raw, place, report),
         None if kind == "continuous" => {}
-        None => report.error(&raw.place, Problem::MissingLimit { joint: urdf.name.clone(), kind }),
+        None => {
+            let message = format!("{kind} joint {:?} has no <limit>", urdf.name);
+            let or = if kind == "revolute" { " or make the joint continuous" } else { "" };
+            let help = format!("add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/>{or}");
+            report.error(&raw.place, "missing-limit", message, help);
+        }
     }
     joint.mimic = urdf.mimic.clone().map(follower);
     joint
@@ -102,7 +106,8 @@ fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
     };
     let Some((unit, norm)) = Unit::try_new_and_get(Vector3::from(*raw.urdf.axis.xyz), 1e-12) else {
         if !raw.faulty {
-            report.error(place, Problem::ZeroAxis { joint: name.clone() });
+            let message = format!("joint {name:?}: the axis is the zero vector");
+            report.error(place, "zero-axis", message, "write the axis as a unit vector, such as xyz=\"0 0 1\"");
         }
         return Vector3::x_axis();
     };
@@ -120,8 +125,9 @@ fn limits(raw: &RawJoint, place: &TextPosition, report: &mut Report) -> Limits {
         limits.lower = limit.lower;
         limits.upper = limit.upper;
         if limits.lower > limits.upper {
-            let (joint, lower, upper) = (name.clone(), limits.lower, limits.upper);
-            report.error(place, Problem::LimitsReversed { joint, lower, upper });
+            let Limits { lower, upper, .. } = limits;
+            let message = format!("joint {name:?}: the lower limit {lower} is above the upper limit {upper}");
+            report.error(place, "limits-reversed", message, "exchange lower and upper; angles are in radians");
         } else if limits.lower == limits.upper && !raw.faulty {
             let message = format!("joint {name:?} cannot move: both limits are {}", limits.lower);
             report.warning(place, "no-range", message, "give lower and upper, or make the joint fixed");
@@ -129,8 +135,9 @@ fn limits(raw: &RawJoint, place: &TextPosition, report: &mut Report) -> Limits {
     }
     let mut magnitude = |attribute: &'static str, code: &'static str, value: f64| {
         if value < 0.0 {
-            let joint = name.clone();
-            report.error(place, Problem::NegativeLimit { joint, attribute, value });
+            let message = format!("joint {name:?}: the {attribute} limit {value} is negative");
+            let help = "limits of speed and effort are magnitudes; 0 means unknown";
+            report.error(place, "negative-limit", message, help);
         } else if value == 0.0 {
             let message = format!("joint {name:?}: the {attribute} limit is 0, which is taken for unknown (no limit)");
             report.note(place, code, message, "write the limit if it is known");
@@ -176,12 +183,10 @@ fn check_mimics(robot: &RawRobot, report: &mut Report) {
         // An empty name was already reported as a missing attribute.
         let Some(mimic) = joint.urdf.mimic.as_ref().filter(|m| !m.joint.is_empty()) else { continue };
         let Some(leader) = joints.get(mimic.joint.as_str()) else {
-            let problem = Problem::UnknownMimic {
-                joint: joint.urdf.name.clone(),
-                leader: mimic.joint.clone(),
-                closest: closest(&mimic.joint, robot.joints.iter().map(|j| j.urdf.name.as_str())),
-            };
-            report.error(&joint.mimic, problem);
+            let message = format!("joint {:?} mimics {:?}, which does not exist", joint.urdf.name, mimic.joint);
+            let meant = closest(&mimic.joint, robot.joints.iter().map(|j| j.urdf.name.as_str()));
+            let help = did_you_mean(meant, "correct the name or define it");
+            report.error(&joint.mimic, "unknown-mimic", message, help);
             continue;
         };
         if in_reported_circle.contains(&joint.urdf.name.as_str()) {
@@ -193,8 +198,9 @@ fn check_mimics(robot: &RawRobot, report: &mut Report) {
             if let Some(start) = circle.iter().position(|n| *n == at.urdf.name) {
                 // A joint that follows the cycle without being in it is not another fault.
                 if start == 0 {
-                    let joints = circle.iter().map(|n| (*n).to_owned()).collect();
-                    report.error(&joint.mimic, Problem::MimicCycle { joints });
+                    let joints = quoted(circle.iter().copied());
+                    let message = format!("the joints {joints} mimic each other in a circle");
+                    report.error(&joint.mimic, "mimic-cycle", message, "let one of them go without <mimic>");
                     in_reported_circle.extend(&circle);
                 }
                 break;

@@ -33,7 +33,7 @@
 //!
 //! let wrong = text.replace("link=\"rod\"", "link=\"rd\"");
 //! let findings = check_urdf_text(&wrong, "pendulum.urdf", &ReadOptions::default());
-//! assert_eq!(findings[0].location, "pendulum.urdf:11");
+//! assert_eq!(findings[0].location, "pendulum.urdf:11:4");
 //! assert_eq!(findings[0].help, "did you mean \"rod\"?");
 //! # Ok::<(), flexarm_urdf::UrdfError>(())
 //! ```
@@ -48,12 +48,12 @@
 #![allow(non_snake_case, reason = "monogram notation: X_PJ, R_LI, T_VG")]
 
 mod error;
-mod finding;
 mod geometry;
 mod inertia;
 mod joints;
 mod lint;
 pub mod mesh;
+mod place;
 mod raw;
 mod read;
 mod report;
@@ -65,8 +65,7 @@ mod tree;
 mod xacro;
 mod xml;
 
-pub use error::{Issue, Problem, UrdfError, XacroError};
-pub use finding::{Finding, Severity, TextPosition};
+pub use error::UrdfError;
 pub use flexarm_settings::closest;
 pub use geometry::{Geometry, Visual};
 pub use mesh::{

@@ -11,9 +11,8 @@ use nalgebra::{Matrix3, Rotation3, Translation3};
 use roxmltree::Node;
 use urdf_rs::JointType;
 
-use crate::error::Problem;
-use crate::finding::TextPosition;
 use crate::lint::{JointMarks, OriginMark, PlainUrdf, lint};
+use crate::place::TextPosition;
 use crate::report::Report;
 use crate::transmission::Transmission;
 use crate::xml::Lines;
@@ -84,10 +83,16 @@ pub(crate) fn read_robot(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Rep
     let fits = |urdf: &urdf_rs::Robot| urdf.links.len() == plain.links.len() && urdf.joints.len() == plain.joints.len();
     match urdf_rs::read_from_string(&plain.text) {
         Ok(urdf) if fits(&urdf) => return Some(RawRobot::new(urdf, plain)),
-        Ok(_) => report.error(&plain.place, Problem::NotRead { reason: "it sees other links and joints".to_owned() }),
-        Err(error) => report.error(&plain.place, Problem::NotRead { reason: error.to_string() }),
+        Ok(_) => not_read(&plain.place, &"it sees other links and joints", report),
+        Err(error) => not_read(&plain.place, &error, report),
     }
     None
+}
+
+/// Reports that `urdf_rs` rejects a robot without a fault.
+fn not_read(place: &TextPosition, reason: &dyn std::fmt::Display, report: &mut Report) {
+    let help = "please report it with the file; do names hold unusual characters?";
+    report.error(place, "not-read", format!("urdf-rs does not read this robot: {reason}"), help);
 }
 
 impl RawRobot {

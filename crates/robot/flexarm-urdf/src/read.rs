@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::{Link, Mechanism};
+use flexarm_settings::Finding;
 
 use crate::error::UrdfError;
-use crate::finding::{Finding, Severity};
 use crate::geometry::Visual;
 use crate::mesh::UpAxis;
 use crate::raw::{RawRobot, read_robot};
-use crate::report::Report;
+use crate::report::{Report, position};
 use crate::resolve::Resolver;
 use crate::tcp::tcp_candidates;
 use crate::transmission::Transmission;
@@ -138,7 +138,7 @@ pub fn check_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding>
     let path = path.as_ref();
     match load_text(path) {
         Ok(text) => all_findings(parse(&text, path, options)),
-        Err(error) => error.findings(),
+        Err(error) => error.into_findings(),
     }
 }
 
@@ -148,14 +148,10 @@ pub fn check_urdf_text(text: &str, origin_path: impl AsRef<Path>, options: &Read
 }
 
 fn all_findings((result, report): (Result<UrdfRobot, UrdfError>, Report)) -> Vec<Finding> {
-    let mut findings = match result {
-        Ok(_) => Vec::new(),
-        Err(error) => error.findings(),
-    };
+    let mut findings = result.err().map_or_else(Vec::new, UrdfError::into_findings);
     findings.extend(report.remarks());
     // Stable sort: within a line, errors precede remarks.
-    let line = |f: &Finding| f.location.rsplit(':').next().and_then(|l| l.parse::<u32>().ok()).unwrap_or(0);
-    findings.sort_by_key(line);
+    findings.sort_by_key(|finding| position(finding).0);
     findings
 }
 
@@ -175,14 +171,14 @@ fn load_text(path: &Path) -> Result<String, UrdfError> {
     }
     // Devices and pipes are refused, since a read may never end.
     if !meta.is_file() {
-        return Err(io_error(std::io::Error::other("this is not a file")));
+        return Err(io_error(std::io::Error::other("this is not a file; give the path of a regular one")));
     }
     if meta.len() > LARGEST {
         let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());
         return Err(io_error(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what)));
     }
     let bytes = std::fs::read(path).map_err(io_error)?;
-    xml::decode(bytes, path).map_err(|issue| UrdfError::Invalid { issues: vec![*issue] })
+    Ok(xml::decode(bytes, path)?)
 }
 
 fn parse(text: &str, path: &Path, options: &ReadOptions) -> (Result<UrdfRobot, UrdfError>, Report) {
@@ -237,7 +233,7 @@ fn parse_expanded(
             robot.warnings = report.remarks();
             Ok(robot)
         }
-        _ => Err(UrdfError::Invalid { issues: report.sorted_issues() }),
+        _ => Err(UrdfError::Invalid { issues: report.sorted_issues(), waivable: report.waivable.clone() }),
     }
 }
 
@@ -294,6 +290,6 @@ fn assemble(
 impl UrdfRobot {
     /// The warnings without the notes.
     pub fn warnings_only(&self) -> impl Iterator<Item = &Finding> {
-        self.warnings.iter().filter(|f| f.severity == Severity::Warning)
+        self.warnings.iter().filter(|finding| finding.warns())
     }
 }

@@ -8,9 +8,9 @@ use flexarm_kinematics::Pose;
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry as Shape;
 
-use crate::finding::TextPosition;
 use crate::geometry::{Geometry, Visual};
 use crate::mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_with_remarks};
+use crate::place::TextPosition;
 use crate::raw::{RawRobot, RawVisual, color};
 use crate::report::Report;
 use crate::resolve::Resolver;

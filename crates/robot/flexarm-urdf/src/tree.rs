@@ -8,30 +8,33 @@ use std::collections::{HashMap, HashSet};
 
 use flexarm_kinematics::Pose;
 
-use crate::error::Problem;
+use crate::place::TextPosition;
 use crate::raw::{RawJoint, RawRobot};
-use crate::report::Report;
+use crate::report::{Report, did_you_mean, quoted};
 use flexarm_settings::closest;
 
 /// Reports duplicate names of links and joints; later checks use only the first.
 pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
     if robot.links.is_empty() && report.issues.is_empty() {
-        report
-            .error(&robot.place, Problem::NoLink { robot: robot.name.clone(), idle_macros: robot.idle_macros.clone() });
+        let calls: Vec<_> = robot.idle_macros.iter().take(3).map(|name| format!("<xacro:{name} .../>")).collect();
+        let (macros, help) = match calls.is_empty() {
+            true => ("", "is the file complete? A robot needs at least one <link>".to_owned()),
+            false => (
+                ": the file defines macros and calls none",
+                format!("give the file that calls them, or one that includes this one and calls {}", calls.join(", ")),
+            ),
+        };
+        report.error(&robot.place, "no-link", format!("the robot {:?} has no <link>{macros}", robot.name), help);
     }
-    let mut first: HashMap<&str, u32> = HashMap::new();
-    for link in &robot.links {
-        if let Some(&first_line) = first.get(link.name.as_str()) {
-            report.error(&link.place, Problem::DuplicateLink { link: link.name.clone(), first_line });
+    let links = robot.links.iter().map(|link| ("link", "duplicate-link", &link.name, &link.place));
+    let joints = robot.joints.iter().map(|joint| ("joint", "duplicate-joint", &joint.urdf.name, &joint.place));
+    let mut first: HashMap<(&str, &str), &TextPosition> = HashMap::new();
+    for (kind, code, name, place) in links.chain(joints) {
+        if let Some(first) = first.get(&(kind, name.as_str())) {
+            let message = format!("{kind} {name:?} is defined twice, first at {first}");
+            report.error(place, code, message, "rename or remove one of them");
         }
-        first.entry(&link.name).or_insert(link.place.line);
-    }
-    let mut first: HashMap<&str, u32> = HashMap::new();
-    for joint in &robot.joints {
-        if let Some(&first_line) = first.get(joint.urdf.name.as_str()) {
-            report.error(&joint.place, Problem::DuplicateJoint { joint: joint.urdf.name.clone(), first_line });
-        }
-        first.entry(&joint.urdf.name).or_insert(joint.place.line);
+        first.entry((kind, name)).or_insert(place);
     }
 }
 
@@ -44,9 +47,10 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
         for (role, link) in [("parent", &joint.urdf.parent.link), ("child", &joint.urdf.child.link)] {
             // An empty name was already reported as a missing element.
             if !link.is_empty() && !names.contains(link.as_str()) {
-                let (joint_name, link) = (joint.urdf.name.clone(), link.clone());
-                let closest = closest(&link, robot.links.iter().map(|l| l.name.as_str()));
-                report.error(&joint.place, Problem::UnknownLink { joint: joint_name, role, link, closest });
+                let message = format!("joint {:?}: its {role} link {link:?} does not exist", joint.urdf.name);
+                let meant = closest(link, robot.links.iter().map(|l| l.name.as_str()));
+                let help = did_you_mean(meant, "correct the name or define it");
+                report.error(&joint.place, "unknown-link", message, help);
             }
         }
         let child = &joint.urdf.child.link;
@@ -54,13 +58,10 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
             continue;
         }
         if let Some(first) = parent_joint.get(child.as_str()) {
-            let problem = Problem::TwoParents {
-                link: child.clone(),
-                first: first.urdf.name.clone(),
-                first_line: first.place.line,
-                second: joint.urdf.name.clone(),
-            };
-            report.error(&joint.place, problem);
+            let (first, place, second) = (&first.urdf.name, &first.place, &joint.urdf.name);
+            let message = format!("link {child:?} is the child of two joints, {first:?} ({place}) and {second:?}");
+            let help = "URDF describes trees: remove one of the joints; a closed loop is described with <mimic>";
+            report.error(&joint.place, "two-parents", message, help);
         } else {
             parent_joint.insert(child, joint);
         }
@@ -75,8 +76,10 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
     }
     let roots: Vec<_> = robot.links.iter().filter(|l| !parent_joint.contains_key(l.name.as_str())).collect();
     if let [_, second, ..] = roots[..] {
-        let roots = roots.iter().map(|l| l.name.clone()).collect();
-        report.error(&second.place, Problem::Disconnected { roots });
+        let roots = quoted(roots.iter().map(|link| link.name.as_str()));
+        let message = format!("the links are not connected: {roots} have no parent joint, expected one base link");
+        let help = "add a (fixed) joint between the parts or remove the part not needed";
+        report.error(&second.place, "disconnected", message, help);
     }
 }
 
@@ -93,10 +96,10 @@ fn report_cycles(robot: &RawRobot, parent_joint: &HashMap<&str, &RawJoint>, repo
                 break;
             }
             if let Some(&start) = on_path.get(at) {
-                let mut joints: Vec<String> = path[start..].iter().map(|j| j.urdf.name.clone()).collect();
-                joints.reverse();
                 if !reported.contains(&at) {
-                    report.error(&joint.place, Problem::Cycle { joints });
+                    let joints = quoted(path[start..].iter().rev().map(|joint| joint.urdf.name.as_str()));
+                    let message = format!("the joints {joints} form a cycle without a base link");
+                    report.error(&joint.place, "cycle", message, "remove one of these joints or correct its parent");
                 }
                 reported.extend(path[start..].iter().map(|j| j.urdf.child.link.as_str()));
                 break;

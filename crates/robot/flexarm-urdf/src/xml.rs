@@ -3,12 +3,13 @@
 //! Not here: the meaning of elements ([`crate::document`]).
 
 use std::borrow::Cow;
+use std::fmt::Display;
 use std::path::{Path, PathBuf};
 
+use flexarm_settings::Finding;
 use roxmltree::{Document, Error, Node};
 
-use crate::error::{Issue, Problem};
-use crate::finding::TextPosition;
+use crate::place::TextPosition;
 
 /// Start offsets of all lines, to convert byte offsets to places without scanning the text each
 /// time.
@@ -64,13 +65,15 @@ pub(crate) fn named<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, '
 }
 
 /// Decodes UTF-8 without a byte order mark.
-pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Issue>> {
+pub(crate) fn decode(bytes: Vec<u8>, file: &Path) -> Result<String, Box<Finding>> {
     let text = String::from_utf8(bytes).map_err(|error| {
         let at = error.utf8_error().valid_up_to();
         let bytes = error.as_bytes();
         let valid = String::from_utf8_lossy(&bytes[..at]);
         let place = Lines::new(file, &valid).place(at);
-        Box::new(Issue { place, problem: Problem::NotUtf8 { byte: bytes[at] } })
+        let message = format!("the byte 0x{:02x} is not UTF-8 text", bytes[at]);
+        let help = "save the file as UTF-8; is it a URDF at all?";
+        Box::new(Finding::error("not-utf8", place.to_string(), message, help))
     })?;
     Ok(text.strip_prefix('\u{feff}').map(str::to_owned).unwrap_or(text))
 }
@@ -84,7 +87,7 @@ const MAX_PREFIXES: usize = 20;
 
 /// Returns the tree of the text, or the first syntax error. Limits the attributes before any parser
 /// sees them.
-pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Issue>> {
+pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>, Box<Finding>> {
     if let Some((at, what)) = crowded(text) {
         return Err(Box::new(issue(lines.place(at), format!("more than {MAX_ATTRIBUTES} {what}"), "fewer")));
     }
@@ -127,7 +130,7 @@ fn crowded(text: &str) -> Option<(usize, &'static str)> {
     crowded.map(|(at, _)| (at, "attributes in one element"))
 }
 
-fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
+fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Finding {
     if matches!(error, Error::DtdDetected) {
         let place = lines.place(text.find("<!DOCTYPE").unwrap_or(0));
         return issue(place, "a document type declaration", "plain XML: remove <!DOCTYPE ...> and what it declares");
@@ -139,9 +142,9 @@ fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
         let expected = match innermost_open(text) {
             _ if text.trim().is_empty() => "<robot name=\"...\">".to_owned(),
             Open::InsideTag(name, at) => {
-                format!("the rest of <{name} ...>, which starts in line {}", lines.place(at).line)
+                format!("the rest of <{name} ...>, which starts at {}", lines.place(at))
             }
-            Open::Element(name, at) => format!("</{name}>, which is opened in line {}", lines.place(at).line),
+            Open::Element(name, at) => format!("</{name}>, which is opened at {}", lines.place(at)),
             Open::Nothing => "an XML element <robot>".to_owned(),
         };
         return issue(lines.end(), "the end of the file", expected);
@@ -168,8 +171,10 @@ fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Issue {
     }
 }
 
-fn issue(place: TextPosition, found: impl Into<String>, expected: impl Into<String>) -> Issue {
-    Issue { place, problem: Problem::Malformed { found: found.into(), expected: expected.into() } }
+/// Error about a text that is truncated or not well-formed XML.
+pub(crate) fn issue(place: TextPosition, found: impl Display, expected: impl Display) -> Finding {
+    let help = "is the file complete? Export or copy it again, or mend it here";
+    Finding::error("malformed-xml", place.to_string(), format!("found {found}, expected {expected}"), help)
 }
 
 fn shown(byte: u8) -> String {

@@ -1,20 +1,27 @@
 //! Every fault is found once, with its line and a remedy.
 
 use crate::common::{TestFolder, hinge, link, problem, problems, problems_with, robot, with_joint};
-use flexarm_urdf::{Problem, ReadOptions, Severity, UrdfError, check_urdf, check_urdf_text, parse_urdf, read_urdf};
+use flexarm_settings::Severity;
+use flexarm_urdf::{ReadOptions, UrdfError, check_urdf, check_urdf_text, parse_urdf, read_urdf};
 
 #[track_caller]
 fn assert_code(text: &str, line: u32, code: &str) {
     let (found_line, found) = problem(text);
-    assert_eq!((found.code(), found_line), (code, line), "{found}");
-    assert!(!found.help().is_empty() && !found.to_string().is_empty());
+    assert_eq!((&*found.code, found_line), (code, line), "{found}");
+    assert!(!found.help.is_empty() && !found.message.is_empty());
+}
+
+#[track_caller]
+fn assert_message(text: &str, line: u32, code: &str, message: &str) {
+    let (found_line, found) = problem(text);
+    assert_eq!((found_line, &*found.code, &*found.message), (line, code, message));
 }
 
 #[test]
 fn malformed_xml_names_what_was_found_and_expected() {
     let cases = [
         ("", "the end of the file", "<robot"),
-        ("<robot name='r'>\n<link name='a'>\n", "the end of the file", "</link>, which is opened in line 2"),
+        ("<robot name='r'>\n<link name='a'>\n", "the end of the file", "</link>, which is opened at robot.urdf:2:1"),
         ("<robot name='r'>\n<link name='a", "the end of the file", "the rest of <link ...>"),
         ("<robot name='r'><link name='a'></joint></robot>", "</joint>", "</link>"),
         ("<robot name='r' name='s'/>", "a second attribute \"name\"", "once"),
@@ -25,7 +32,8 @@ fn malformed_xml_names_what_was_found_and_expected() {
     ];
     for (text, found_part, expected_part) in cases {
         let (_, fault) = problem(text);
-        let Problem::Malformed { found, expected } = &fault else { panic!("{text:?}: {fault:?}") };
+        assert_eq!(fault.code, "malformed-xml");
+        let (found, expected) = fault.message.split_once(", expected ").unwrap();
         assert!(found.contains(found_part), "{text:?}: {found}");
         assert!(expected.contains(expected_part), "{text:?}: {expected}");
     }
@@ -37,14 +45,15 @@ fn malformed_xml_names_what_was_found_and_expected() {
 #[test]
 fn other_files_are_recognised() {
     assert_code("<sdf/>", 1, "not-urdf");
-    assert!(problem("<mujoco/>").1.help().contains("MJCF"));
+    assert!(problem("<mujoco/>").1.help.contains("MJCF"));
     let macros = "<robot xmlns:xacro='http://www.ros.org/wiki/xacro'>\n<xacro:macro name='m'/></robot>";
     assert_code(macros, 1, "no-link");
     let folder = TestFolder::new();
     let path = folder.write("a.urdf", b"<robot name='\xff'/>");
     let error = read_urdf(&path, &ReadOptions::default()).unwrap_err();
-    assert_eq!(error.issues()[0].problem, Problem::NotUtf8 { byte: 0xff });
-    assert_eq!(error.issues()[0].place.column, 14);
+    let issue = &error.issues()[0];
+    assert_eq!((&*issue.code, &*issue.message), ("not-utf8", "the byte 0xff is not UTF-8 text"));
+    assert!(issue.location.ends_with("a.urdf:1:14"), "{issue}");
 }
 
 #[test]
@@ -53,7 +62,10 @@ fn unreadable_files_say_so() {
     let missing = folder.0.join("missing.urdf");
     assert!(matches!(read_urdf(&missing, &ReadOptions::default()), Err(UrdfError::Io { .. })));
     assert!(matches!(read_urdf(&folder, &ReadOptions::default()), Err(UrdfError::Io { .. })));
-    assert_eq!(check_urdf(&missing, &ReadOptions::default())[0].code, "unreadable");
+    let finding = &check_urdf(&missing, &ReadOptions::default())[0];
+    assert_eq!((&*finding.code, &*finding.help), ("unreadable", "correct the path"));
+    let error = read_urdf(&missing, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(error.ends_with("help: correct the path"), "{error}");
 }
 
 #[test]
@@ -61,21 +73,11 @@ fn names_are_unique_and_known() {
     assert_code("<robot name='r'/>", 1, "no-link");
     assert_code(&robot(&[&link("a"), &link("b"), &hinge("j", "a", "b"), &link("b")]), 5, "duplicate-link");
     let twice = robot(&[&link("a"), &link("b"), &link("c"), &hinge("j", "a", "b"), &hinge("j", "b", "c")]);
-    assert_eq!(problem(&twice), (6, Problem::DuplicateJoint { joint: "j".into(), first_line: 5 }));
+    assert_message(&twice, 6, "duplicate-joint", "joint \"j\" is defined twice, first at robot.urdf:5:1");
 
     let unknown = robot(&[&link("base_link"), &link("arm"), &hinge("j", "base_lnk", "arm")]);
-    let (line, fault) = problem(&unknown);
-    assert_eq!(line, 4);
-    assert_eq!(
-        fault,
-        Problem::UnknownLink {
-            joint: "j".into(),
-            role: "parent",
-            link: "base_lnk".into(),
-            closest: Some("base_link".into())
-        }
-    );
-    assert_eq!(fault.help(), "did you mean \"base_link\"?");
+    assert_message(&unknown, 4, "unknown-link", "joint \"j\": its parent link \"base_lnk\" does not exist");
+    assert_eq!(problem(&unknown).1.help, "did you mean \"base_link\"?");
 }
 
 #[test]
@@ -88,17 +90,17 @@ fn the_links_form_one_tree() {
         &hinge("k", "a", "c"),
         &hinge("l", "b", "c"),
     ]);
-    let two_parents = Problem::TwoParents { link: "c".into(), first: "k".into(), first_line: 6, second: "l".into() };
-    assert_eq!(problem(&two), (7, two_parents));
+    let message = "link \"c\" is the child of two joints, \"k\" (robot.urdf:6:1) and \"l\"";
+    assert_message(&two, 7, "two-parents", message);
 
     let cycle = robot(&[&link("a"), &link("b"), &link("c"), &hinge("j", "b", "c"), &hinge("k", "c", "b")]);
     let (_, fault) = problem(&cycle);
-    let Problem::Cycle { joints } = fault else { panic!("{fault}") };
-    assert_eq!(joints.len(), 2);
+    assert_eq!((&*fault.code, fault.message.matches('"').count()), ("cycle", 4), "{fault}");
     assert_code(&robot(&[&link("a"), &hinge("j", "a", "a")]), 3, "cycle");
 
     let apart = robot(&[&link("a"), &link("b"), &link("c"), &hinge("j", "a", "b")]);
-    assert_eq!(problem(&apart), (4, Problem::Disconnected { roots: vec!["a".into(), "c".into()] }));
+    let message = "the links are not connected: \"a\", \"c\" have no parent joint, expected one base link";
+    assert_message(&apart, 4, "disconnected", message);
 }
 
 #[test]
@@ -106,10 +108,7 @@ fn missing_parts_are_named() {
     assert_code(&robot(&["<link/>\n", &link("a")]), 2, "missing-attribute");
     let no_mass =
         "<link name='a'><inertial><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial></link>";
-    assert_eq!(
-        problem(&robot(&[no_mass])),
-        (2, Problem::MissingElement { owner: "link \"a\", <inertial>".into(), element: "mass" })
-    );
+    assert_message(&robot(&[no_mass]), 2, "missing-element", "link \"a\", <inertial> has no <mass>");
     let no_parent = with_joint("<joint name='j' type='continuous'><child link='arm'/></joint>");
     assert_code(&no_parent, 4, "missing-element");
     let empty = "<joint name='j' type='continuous'><parent link=''/><child link='arm'/></joint>";
@@ -127,8 +126,9 @@ fn what_is_not_a_finite_number_is_refused_where_it_stands() {
     for word in ["NaN", "inf", "1,5", "", "0x10", "1e999", "two"] {
         let text = robot(&[&link("a").replace("value=\"2\"", &format!("value=\"{word}\""))]);
         let (line, fault) = problem(&text);
-        let Problem::NotANumber { owner, attribute, found, .. } = fault else { panic!("{word}: {fault}") };
-        assert_eq!((line, owner.as_str(), attribute, found.as_str()), (2, "link \"a\", <mass>", "value", word));
+        assert_eq!((line, &*fault.code), (2, "not-a-number"));
+        let found = format!("link \"a\", <mass>: value={word:?}, expected ");
+        assert!(fault.message.starts_with(&found), "{fault}");
     }
     for origin in ["xyz='0 0'", "xyz='0 0 0 0'", "rpy='0 x 0 0'", "rpy='0 0 nan'"] {
         let joint = hinge("j", "base", "arm").replace("<axis", &format!("\n<origin {origin}/><axis"));
@@ -149,21 +149,19 @@ fn joint_types_and_limits() {
     };
     for kind in ["floating", "planar", "spherical"] {
         let (line, fault) = problem(&joint(kind, ""));
-        assert_eq!((line, fault.code()), (4, "unsupported-joint"));
-        assert!(fault.to_string().contains(kind) && fault.help().contains("joint"));
+        assert_eq!((line, &*fault.code), (4, "unsupported-joint"));
+        assert!(fault.message.contains(kind) && fault.help.contains("joint"));
     }
     let (_, fault) = problem(&joint("revolut", ""));
-    assert_eq!(fault.help(), "did you mean \"revolute\"?");
-    assert_eq!(problem(&joint("revolute", "")), (4, Problem::MissingLimit { joint: "j".into(), kind: "revolute" }));
-    assert_eq!(problem(&joint("prismatic", "")).1.code(), "missing-limit");
+    assert_eq!(fault.help, "did you mean \"revolute\"?");
+    assert_message(&joint("revolute", ""), 4, "missing-limit", "revolute joint \"j\" has no <limit>");
+    assert_eq!(problem(&joint("prismatic", "")).1.code, "missing-limit");
     let reversed = joint("revolute", "<limit lower='1' upper='-1' effort='1' velocity='1'/>");
-    assert_eq!(problem(&reversed).1, Problem::LimitsReversed { joint: "j".into(), lower: 1.0, upper: -1.0 });
-    assert_eq!(
-        problem(&joint("continuous", "<limit effort='-1' velocity='1'/>")).1,
-        Problem::NegativeLimit { joint: "j".into(), attribute: "effort", value: -1.0 }
-    );
+    assert_message(&reversed, 4, "limits-reversed", "joint \"j\": the lower limit 1 is above the upper limit -1");
+    let negative = joint("continuous", "<limit effort='-1' velocity='1'/>");
+    assert_message(&negative, 4, "negative-limit", "joint \"j\": the effort limit -1 is negative");
     let zero = joint("continuous", "").replace("0 0 1", "0 0 0");
-    assert_eq!(problem(&zero), (4, Problem::ZeroAxis { joint: "j".into() }));
+    assert_message(&zero, 4, "zero-axis", "joint \"j\": the axis is the zero vector");
 }
 
 #[test]
@@ -171,28 +169,29 @@ fn followers_have_a_leader_that_moves() {
     let follower =
         |leader: &str| hinge("j", "base", "arm").replace("</joint>", &format!("<mimic joint='{leader}'/></joint>"));
     let (_, fault) = problem(&with_joint(&follower("jj")));
-    assert_eq!(fault.code(), "unknown-mimic");
-    assert_eq!(problem(&with_joint(&follower("j"))).1, Problem::MimicCycle { joints: vec!["j".into()] });
+    assert_eq!(fault.code, "unknown-mimic");
+    let itself = "the joints \"j\" mimic each other in a circle";
+    assert_message(&with_joint(&follower("j")), 4, "mimic-cycle", itself);
     let two =
         hinge("j", "base", "arm").replace("</joint>", "<mimic joint='a'/><mimic joint='b' multiplier='2'/></joint>");
     let (a, b) = (hinge("a", "arm", "hand"), hinge("b", "hand", "tip"));
     let text = robot(&[&link("base"), &link("arm"), &link("hand"), &link("tip"), &two, &a, &b]);
     let (_, fault) = problem(&text);
-    assert_eq!(fault, Problem::SeveralMimics { joint: "j".into(), count: 2 });
-    assert!(fault.help().contains("[[loop]]"), "{}", fault.help());
+    assert_eq!(fault.message, "joint \"j\" has 2 <mimic>; a joint follows one other joint");
+    assert!(fault.help.contains("[[loop]]"), "{}", fault.help);
     let fixed = "<joint name='f' type='fixed'><parent link='arm'/><child link='tip'/></joint>\n";
     let text = robot(&[&link("base"), &link("arm"), "<link name='tip'/>\n", &follower("f"), fixed]);
     assert_eq!(warned(&text), ["mimic-fixed"]);
     let second = hinge("k", "arm", "hand").replace("</joint>", "<mimic joint='j'/></joint>");
     let third = hinge("l", "hand", "tip").replace("</joint>", "<mimic joint='j'/></joint>");
     let text = robot(&[&link("base"), &link("arm"), &link("hand"), &link("tip"), &follower("k"), &second, &third]);
-    assert_eq!(problem(&text).1, Problem::MimicCycle { joints: vec!["j".into(), "k".into()] });
+    assert_eq!(problem(&text).1.message, "the joints \"j\", \"k\" mimic each other in a circle");
 }
 
 /// Codes of the warnings about a usable robot.
-fn warned(text: &str) -> Vec<&'static str> {
+fn warned(text: &str) -> Vec<String> {
     let robot = parse_urdf(text, "r.urdf", &ReadOptions::default()).unwrap_or_else(|e| panic!("{e}"));
-    robot.warnings_only().map(|finding| finding.code).collect()
+    robot.warnings_only().map(|finding| finding.code.clone()).collect()
 }
 
 /// A joint with prescribed motion needs no mass, but a missing mass gives a warning.
@@ -252,7 +251,7 @@ fn what_follows_a_fixed_joint_is_fixed_at_its_offset() {
         .replace("</joint>", "<mimic joint='f' multiplier='3' offset='1.5707963267948966'/></joint>");
     let text = robot(&[&link("base"), &link("arm"), "<link name='tip'/>\n", &follower, fixed]);
     let read = parse_urdf(&text, "r.urdf", &ReadOptions::default()).unwrap();
-    assert_eq!(read.warnings_only().map(|f| f.code).collect::<Vec<_>>(), ["mimic-fixed", "mimic-fixed"]);
+    assert_eq!(read.warnings_only().map(|f| &*f.code).collect::<Vec<_>>(), ["mimic-fixed", "mimic-fixed"]);
     let joint = read.mechanism.joint("j").unwrap();
     assert!(joint.mimic.is_none() && joint.kind.name() == "fixed");
     approx::assert_relative_eq!(joint.X_PJ.rotation.angle(), std::f64::consts::FRAC_PI_2, max_relative = 1e-12);
@@ -284,33 +283,27 @@ fn inertial(mass: f64, moments: [f64; 3]) -> String {
 
 #[test]
 fn a_moving_link_has_the_mass_of_a_body() {
-    assert_eq!(
-        problem(&with_inertial(&inertial(-1.0, [1.0; 3]))).1,
-        Problem::NegativeMass { link: "arm".into(), mass: -1.0 }
-    );
+    let negative = "link \"arm\" has the mass -1 kg, expected a positive one";
+    assert_message(&with_inertial(&inertial(-1.0, [1.0; 3])), 3, "negative-mass", negative);
     for moments in [[1.0, 1.0, -1.0], [1.0, 1.0, -1e-5]] {
         assert_code(&with_inertial(&inertial(1.0, moments)), 3, "inertia-not-positive-definite");
     }
     let (_, fault) = problem(&with_inertial(&inertial(1.0, [1.0, 1.0, 2.1])));
-    let Problem::TriangleInequality { excess, .. } = fault else { panic!("{fault}") };
-    approx::assert_relative_eq!(excess, 0.1, max_relative = 1e-12); // measured 9e-16
+    assert!(fault.code == "triangle-inequality" && fault.message.ends_with(" by 1.00e-1"), "{fault}");
     // A flat plate, rounded in the seventh digit, is valid.
     assert_eq!(problems(&with_inertial(&inertial(1.0, [1.0, 1.0, 2.000001]))), []);
-    assert_eq!(
-        problem(&with_inertial(&inertial(1.0, [1e308, 1e308, 1e308]))).1.code(),
-        "inertia-not-positive-definite"
-    );
+    assert_eq!(problem(&with_inertial(&inertial(1.0, [1e308, 1e308, 1e308]))).1.code, "inertia-not-positive-definite");
 }
 
 /// The first link of the Manutec r3 in the Modelica library: a rotor, diag(0, 1.16, 0).
 #[test]
 fn a_rotor_without_extent_passes_where_it_is_waived_by_name() {
     let text = with_inertial(&inertial(1.0, [0.0, 1.16, 0.0]));
-    assert_eq!(problem(&text).1.code(), "triangle-inequality");
+    assert_eq!(problem(&text).1.code, "triangle-inequality");
     let waived = ReadOptions { waive: vec!["arm".into()], ..ReadOptions::default() };
     assert_eq!(problems_with(&text, &waived), []);
     let negative = with_inertial(&inertial(1.0, [-0.1, 1.16, 0.0]));
-    assert_eq!(problems_with(&negative, &waived)[0].1.code(), "inertia-not-positive-definite");
+    assert_eq!(problems_with(&negative, &waived)[0].1.code, "inertia-not-positive-definite");
     let misspelt = ReadOptions { waive: vec!["amr".into(), "arm".into()], ..ReadOptions::default() };
     let findings = check_urdf_text(&text, "r.urdf", &misspelt);
     assert!(findings.iter().any(|f| f.code == "waived-unknown-link"));
@@ -331,7 +324,7 @@ fn the_mass_of_fixed_children_counts() {
 
     let point = parts(&inertial(1.0, [0.0; 3])).replace("<link name='arm'/>", link("arm").trim());
     let findings = check_urdf_text(&point, "r.urdf", &ReadOptions::default());
-    let codes: Vec<_> = findings.iter().map(|f| (f.severity, f.code)).collect();
+    let codes: Vec<_> = findings.iter().map(|f| (f.severity, &*f.code)).collect();
     assert_eq!(codes, [(Severity::Warning, "point-mass")]);
 }
 
@@ -339,7 +332,7 @@ fn the_mass_of_fixed_children_counts() {
 fn the_base_may_have_any_inertia() {
     let text = robot(&[&format!("<link name='base'>{}</link>", inertial(1.0, [1.0, 1.0, 3.0]))]);
     let findings = check_urdf_text(&text, "r.urdf", &ReadOptions::default());
-    assert_eq!((findings[0].severity, findings[0].code), (Severity::Warning, "triangle-inequality"));
+    assert_eq!((findings[0].severity, &*findings[0].code), (Severity::Warning, "triangle-inequality"));
 }
 
 #[test]
@@ -352,7 +345,8 @@ fn all_faults_come_at_once_in_the_order_of_the_file() {
         &hinge("k", "base", "arm").replace("0 0 1", "0 0 0"),
         &hinge("l", "arm", "base2").replace("continuous", "floating"),
     ]);
-    let found: Vec<_> = problems(&text).into_iter().map(|(line, p)| (line, p.code())).collect();
+    let problems = problems(&text);
+    let found: Vec<_> = problems.iter().map(|(line, p)| (*line, &*p.code)).collect();
     assert_eq!(
         found,
         [
@@ -365,7 +359,7 @@ fn all_faults_come_at_once_in_the_order_of_the_file() {
         ]
     );
     let error = parse_urdf(&text, "arm.urdf", &ReadOptions::default()).unwrap_err();
-    assert_eq!(error.to_string().matches("arm.urdf:").count(), 6);
+    assert_eq!(error.to_string().matches("\narm.urdf:").count(), 5);
     assert_eq!(error.to_string().matches("help: ").count(), 6);
-    assert_eq!(error.findings()[0].location, "arm.urdf:3");
+    assert!(error.issues()[0].location.starts_with("arm.urdf:3:"), "{error}");
 }

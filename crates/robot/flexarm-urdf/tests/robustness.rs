@@ -1,7 +1,8 @@
 //! No text makes the reader panic, and every truncation of a file is detected.
 
-use crate::common::{TestFolder, hinge, link, problem, robot};
-use flexarm_urdf::{Finding, ReadOptions, UrdfError, check_urdf_text, parse_urdf, read_urdf};
+use crate::common::{TestFolder, hinge, line, link, problem, robot};
+use flexarm_settings::{Finding, Severity};
+use flexarm_urdf::{ReadOptions, UrdfError, check_urdf_text, parse_urdf, read_urdf};
 use proptest::prelude::*;
 
 fn sound() -> String {
@@ -20,18 +21,18 @@ fn every_truncation_is_an_error_with_a_place() {
     let complete = text.trim_end().len();
     let folder = TestFolder::new();
     for end in (0..complete).filter(|&end| text.is_char_boundary(end)) {
-        let Err(UrdfError::Invalid { issues }) = parse_urdf(&text[..end], "r.urdf", &ReadOptions::default()) else {
+        let Err(UrdfError::Invalid { issues, .. }) = parse_urdf(&text[..end], "r.urdf", &ReadOptions::default()) else {
             panic!("cut at {end}")
         };
-        assert_eq!((issues.len(), issues[0].problem.code()), (1, "malformed-xml"), "cut at {end}");
+        assert_eq!((issues.len(), &*issues[0].code), (1, "malformed-xml"), "cut at {end}");
         let lines = text[..end].trim_end().lines().count().max(1) as u32;
-        assert_eq!(issues[0].place.line, lines, "cut at {end}: {}", issues[0]);
+        assert_eq!(line(&issues[0]), lines, "cut at {end}: {}", issues[0]);
         assert!(issues[0].to_string().contains("found the end of the file, expected "), "{}", issues[0]);
     }
     // within a character
     let at = text.find('é').unwrap() + 1;
     let path = folder.write("cut.urdf", &text.as_bytes()[..at]);
-    assert_eq!(read_urdf(path, &ReadOptions::default()).unwrap_err().issues()[0].problem.code(), "not-utf8");
+    assert_eq!(read_urdf(path, &ReadOptions::default()).unwrap_err().issues()[0].code, "not-utf8");
 }
 
 #[test]
@@ -110,7 +111,7 @@ proptest! {
             ..ReadOptions::default()
         };
         let findings = check(&text, &options);
-        let errors = findings.iter().any(|f| f.severity == flexarm_urdf::Severity::Error);
+        let errors = findings.iter().any(|f| f.severity == Severity::Error);
         prop_assert_eq!(errors, parse_urdf(&text, "r.urdf", &options).is_err());
     }
 }

@@ -4,8 +4,9 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::common::TestFolder;
-use flexarm_urdf::{ReadOptions, UrdfError, XacroError, check_urdf, expand_xacro, parse_urdf, read_urdf};
+use crate::common::{TestFolder, line};
+use flexarm_settings::Finding;
+use flexarm_urdf::{ReadOptions, UrdfError, check_urdf, expand_xacro, parse_urdf, read_urdf};
 
 fn data() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/xacro")
@@ -89,9 +90,9 @@ fn expand(body: &str) -> Result<String, UrdfError> {
 }
 
 #[track_caller]
-fn fault(body: &str) -> Box<XacroError> {
+fn fault(body: &str) -> Finding {
     match expand(body) {
-        Err(UrdfError::Xacro(error)) => error,
+        Err(UrdfError::Invalid { issues, .. }) => issues.into_iter().next().unwrap(),
         Err(other) => panic!("{other}"),
         Ok(text) => panic!("expanded to {} letters", text.len()),
     }
@@ -132,24 +133,22 @@ fn what_is_wrong_in_the_robot_is_told_with_the_line_of_the_macro() {
         .write("robot.xacro", format!("{HEAD}<xacro:include filename='rod.xacro'/>\n<xacro:rod name='a'/></robot>"));
     let findings = check_urdf(&path, &ReadOptions::default());
     let negative = findings.iter().find(|f| f.code == "negative-mass").unwrap();
-    assert!(negative.location.ends_with("rod.xacro:4"), "{negative}");
+    assert!(negative.location.ends_with("rod.xacro:4:5"), "{negative}");
 }
 
 #[test]
 fn faults_name_the_place_the_calls_and_the_way_to_mend_them() {
     let error = fault("<link name='${lenght}'/>");
-    assert_eq!(
-        (error.place.line, error.message.as_str()),
-        (2, "name=...: ${lenght}: the name \"lenght\" is not defined")
-    );
+    assert_eq!((line(&error), error.message.as_str()), (2, "name=...: ${lenght}: the name \"lenght\" is not defined"));
     let error = fault("<xacro:property name='length' value='1'/><link name='${lenght}'/>");
     assert_eq!(error.help, "did you mean \"length\"?");
 
     let error =
         fault("<xacro:macro name='arm' params='side'>\n<link name='${1 / 0}'/></xacro:macro>\n<xacro:arm side='l'/>");
-    assert_eq!(error.place.line, 3);
+    assert_eq!(line(&error), 3);
     assert!(error.message.contains("division by zero"), "{error}");
-    assert!(error.trail[0].contains("in the macro \"arm\"") && error.trail[0].ends_with(":4"), "{error}");
+    let call = error.message.lines().nth(1).unwrap();
+    assert!(call.contains("in the macro \"arm\"") && call.ends_with(":4:1"), "{error}");
 
     for (body, said, help) in [
         ("<xacro:arms/>", "no macro \"arms\"", "define it"),

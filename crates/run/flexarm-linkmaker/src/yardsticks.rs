@@ -1,7 +1,8 @@
 //! Plausibility checks of stiffness against mass, and of the density of a link: detect unit errors
 //! and wrong matrices.
 
-use flexarm_fem::{Doubt, ReducedLink, RigidPart};
+use flexarm_fem::{ReducedLink, RigidPart};
+use flexarm_settings::Finding;
 use nalgebra::{Matrix3, Matrix6};
 
 /// Plausible speed of sound along a link, from stiffness and mass (m/s): steel and aluminium have
@@ -43,7 +44,7 @@ pub fn least_density(mass: f64, inertia: &Matrix3<f64>) -> f64 {
 }
 
 /// Returns warnings about implausible stiffness or mass of a link made from files.
-pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
+pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
     let mut doubts = Vec::new();
     let length = (link.X_LB.translation.vector - link.X_LA.translation.vector).norm();
     let speed = sound_speed(&link.split.K_S, length, whole.mass).filter(|_| whole.mass > 0.0 && length > 0.0);
@@ -58,7 +59,7 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
             "from its stiffness and mass, the speed of sound along the link is {speed:.3e} m/s, expected {end} \
              ({likely})"
         );
-        doubts.push(Doubt::found("link-sound", speed, yardstick, said));
+        doubts.push(Finding::warning("link-sound", "", said, "").measured(speed, yardstick));
     }
     let (com, gyration) = (whole.com.norm(), (whole.inertia.symmetric_eigenvalues().max() / whole.mass).sqrt());
     let size = [link.X_LA, link.X_LB].map(|X| X.translation.vector.norm()).into_iter().fold(length, f64::max);
@@ -70,7 +71,7 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
                 "{what} {value:.3e} m, with interfaces within {size:.3e} m: expected at most {BEYOND} times that (lengths in mm, \
                  or inertia in kg mm2?)"
             );
-            doubts.push(Doubt::found(code, value, BEYOND * size, said));
+            doubts.push(Finding::warning(code, "", said, "").measured(value, BEYOND * size));
         }
     }
     let density = least_density(whole.mass, &whole.inertia);
@@ -79,7 +80,7 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
             "from its mass and inertia, the density of the link is at least {density:.3e} kg/m3, above that of \
              osmium, {OSMIUM} (mass in g, or lengths in m instead of mm?)"
         );
-        doubts.push(Doubt::found("link-density", density, OSMIUM, said));
+        doubts.push(Finding::warning("link-density", "", said, "").measured(density, OSMIUM));
     }
     doubts
 }
@@ -87,13 +88,13 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Doubt> {
 /// Returns a warning about an interface whose point is far from its nodes.
 ///
 /// * `off`: distance from their centroid (m). `extent`: diagonal of their box (m).
-pub(crate) fn of_point(name: &str, off: f64, extent: f64) -> Option<Doubt> {
+pub(crate) fn of_point(name: &str, off: f64, extent: f64) -> Option<Finding> {
     (extent > 0.0 && off > BESIDE * extent).then(|| {
         let said = format!(
             "the point of interface {name:?} is {off:.3e} m from the centroid of its nodes, which extend over {extent:.3e} m: \
              expected at most {BESIDE} times that (another unit or another interface?)"
         );
-        Doubt::found("interface-point", off, BESIDE * extent, said)
+        Finding::warning("interface-point", "", said, "").measured(off, BESIDE * extent)
     })
 }
 
@@ -104,7 +105,7 @@ pub(crate) fn of_point(name: &str, off: f64, extent: f64) -> Option<Doubt> {
 ///   line.
 /// * `share`: number of its nodes relative to that of the mesh.
 #[doc(hidden)]
-pub fn of_interface(name: &str, spread: f64, share: f64) -> Option<Doubt> {
+pub fn of_interface(name: &str, spread: f64, share: f64) -> Option<Finding> {
     (spread > SPREAD && share > SHARE).then(|| {
         let said = format!(
             "interface {name:?} covers {:.0} % of the nodes and {:.0} % of the length between the interfaces, \
@@ -115,6 +116,6 @@ pub fn of_interface(name: &str, spread: f64, share: f64) -> Option<Doubt> {
             100.0 * SHARE,
             100.0 * SPREAD
         );
-        Doubt::found("interface-size", share, SHARE, said)
+        Finding::warning("interface-size", "", said, "").measured(share, SHARE)
     })
 }

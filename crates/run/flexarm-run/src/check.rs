@@ -2,16 +2,14 @@
 
 use std::path::Path;
 
-use flexarm_trajectory::{FileError, PlanError, Problem, TrajectoryError};
-use flexarm_urdf::{Finding as UrdfFinding, Severity};
+use flexarm_trajectory::{MISSING_LIMIT, TrajectoryError};
 use nalgebra::Vector6;
-use serde::Serialize;
 
 use crate::arm::options::Modelling;
 use crate::caveat::motion::of_motion;
 use crate::caveat::of_use::standing_pose;
 use crate::caveat::size::Size;
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Finding};
 use crate::error::Error;
 use crate::motions::motion::Motion;
 use crate::motions::motion_formats::{self, MotionFile, MotionOptions};
@@ -23,63 +21,16 @@ use crate::robot::loops;
 use crate::robot::{LoadOptions, Robot, RobotSource};
 use crate::run::monitor::stress::StressMonitor;
 
-/// A finding.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Finding {
-    /// `error`, `warning` or `note`.
-    pub severity: &'static str,
-    /// Short, stable name of the kind of finding.
-    pub code: String,
-    /// File and line, or joint or link.
-    #[serde(rename = "where")]
-    pub location: String,
-    /// Message.
-    pub message: String,
-    /// Suggested fix.
-    pub help: String,
-    /// Value that was found, if it is a number.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub value: Option<f64>,
-    /// Threshold or reference for the value.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub yardstick: Option<f64>,
-    /// Unit of both.
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub unit: String,
-    /// Unit error or other mistake that would explain the value.
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub likely: String,
+/// Returns an error with its whole text as message.
+fn error(code: &str, location: String, error: &dyn std::fmt::Display) -> Finding {
+    Finding::error(code, location, error.to_string(), "")
 }
 
-impl Finding {
-    fn error(code: &str, location: String, error: &dyn std::fmt::Display) -> Self {
-        Self { severity: "error", code: code.into(), location, message: error.to_string(), ..Self::default() }
-    }
-
-    fn note(code: &str, location: String, message: String) -> Self {
-        Self { severity: "note", code: code.into(), location, message, ..Self::default() }
-    }
-
-    /// Returns a finding for a caveat about something in a file.
-    fn caveat(file: &Path, caveat: Caveat) -> Self {
-        let severity = caveat.severity.word();
-        let prefix = format!("{}: ", file.display());
-        let Caveat { code, message, value, yardstick, unit, likely, help, .. } = caveat;
-        let message = message.strip_prefix(&prefix).map_or(message.clone(), str::to_owned);
-        Self { severity, code, location: file.display().to_string(), message, help, value, yardstick, unit, likely }
-    }
-}
-
-impl From<&UrdfFinding> for Finding {
-    fn from(f: &UrdfFinding) -> Self {
-        let severity = match f.severity {
-            Severity::Error => "error",
-            Severity::Warning => "warning",
-            Severity::Note => "note",
-        };
-        let (code, location) = (f.code.to_owned(), f.location.clone());
-        Self { severity, code, location, message: f.message.clone(), help: f.help.clone(), ..Self::default() }
-    }
+/// Moves the file of a caveat from its message to its place.
+fn about(file: &Path, caveat: Finding) -> Finding {
+    let location = file.display().to_string();
+    let message = caveat.message.strip_prefix(&format!("{location}: ")).unwrap_or(&caveat.message).to_owned();
+    Finding { location, message, ..caveat }
 }
 
 /// Returns all findings about a robot, and about a trajectory on it.
@@ -114,20 +65,20 @@ pub fn check_with_motion(
     let arm = match RobotSource::new(path, options).load() {
         Ok(arm) => arm,
         Err(error) => {
-            load_findings(&error, path, &mut findings);
+            load_findings(error, path, &mut findings);
             findings.extend(trajectory.and_then(|path| motion_without_robot(path, motion_options)));
             return findings;
         }
     };
     let robot = arm.robot();
-    findings.extend(robot.urdf.warnings.iter().map(Finding::from));
+    findings.extend(robot.urdf.warnings.iter().cloned());
     let file = robot.path.clone();
     let own = robot.caveats().into_iter().filter(|caveat| !caveat.of_description);
-    findings.extend(own.map(|caveat| Finding::caveat(&file, caveat)));
+    findings.extend(own.map(|caveat| about(&file, caveat)));
     let motion = match (trajectory, robot.default_trajectory.as_deref()) {
         (None, Some(own)) if !own.is_file() => {
             let message = format!("default_trajectory: there is no file {}", own.display());
-            findings.push(Finding::error("missing-file", path.display().to_string(), &message));
+            findings.push(error("missing-file", path.display().to_string(), &message));
             None
         }
         (Some(path), _) => check_motion(robot, path, motion_options, &mut findings),
@@ -135,7 +86,7 @@ pub fn check_with_motion(
         (None, Some(own)) => robot.rigid_model().ok().and_then(|model| {
             let motion = crate::Motion::load(own, robot).ok()?;
             let along = of_motion(&motion.name, &motion.trajectory, &model);
-            findings.extend(along.into_iter().map(|caveat| Finding::caveat(own, caveat)));
+            findings.extend(along.into_iter().map(|caveat| about(own, caveat)));
             Some(motion)
         }),
         (None, None) => None,
@@ -151,19 +102,19 @@ pub fn check_with_motion(
 fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &mut Vec<Finding>) {
     let Some(motion) = motion else {
         let message = "loads belong to a motion, which is missing or cannot be read";
-        findings.push(Finding::error("loads", path.display().to_string(), &message));
+        findings.push(error("loads", path.display().to_string(), &message));
         return;
     };
     let acting = robot.model(&Modelling::default()).and_then(|arm| {
         Scenario::from(motion).with_loads_file(path).and_then(|scenario| scenario.acting_on(robot, &arm.model))
     });
     match acting {
-        Err(error) => findings.push(Finding::error("loads", path.display().to_string(), &error)),
+        Err(cause) => findings.push(error("loads", path.display().to_string(), &cause)),
         Ok(acting) => {
             let duration = motion.trajectory.duration();
             let heavy = caveat::motion::of_loads(&acting.loads, duration, &Size::of(&robot.rigid));
             let caveats = acting.caveats.into_iter().chain(heavy);
-            findings.extend(caveats.map(|caveat| Finding::caveat(path, caveat)));
+            findings.extend(caveats.map(|caveat| about(path, caveat)));
         }
     }
 }
@@ -172,24 +123,24 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
 /// do not count as missing.
 fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
-    let error = motion_formats::read(&file).err()?;
-    let missed = |file: &FileError| matches!(file.problem, Problem::Plan(PlanError::MissingLimit { .. }));
-    let follows = matches!(&error, Error::Trajectory(TrajectoryError::File(file)) if missed(file));
-    (!follows).then(|| Finding::error("trajectory", path.display().to_string(), &error))
+    let cause = motion_formats::read(&file).err()?;
+    let follows = matches!(&cause, Error::Trajectory(TrajectoryError::File(file)) if file.code == MISSING_LIMIT);
+    (!follows).then(|| error("trajectory", path.display().to_string(), &cause))
 }
 
 /// Adds one finding per error that prevented loading the robot.
-fn load_findings(error: &Error, path: &Path, findings: &mut Vec<Finding>) {
-    match error {
-        Error::Several(errors) => errors.iter().for_each(|e| load_findings(e, path, findings)),
-        Error::Urdf(error) => findings.extend(error.findings().iter().map(Finding::from)),
+fn load_findings(cause: Error, path: &Path, findings: &mut Vec<Finding>) {
+    let file = path.display().to_string();
+    match cause {
+        Error::Several(errors) => errors.into_iter().for_each(|cause| load_findings(cause, path, findings)),
+        Error::Urdf(cause) => findings.extend(cause.into_findings()),
         Error::RobotFile(e) => {
-            let location = format!("{}:{}", e.path.display(), e.line);
-            findings.push(Finding::error("robot-file", location, &e.message));
+            let location = format!("{}:{}:{}", e.path.display(), e.line, e.column);
+            findings.push(error("robot-file", location, &e.message));
         }
-        Error::File { path, what } => findings.push(Finding::error("missing-file", path.display().to_string(), what)),
-        Error::Flex(error) => findings.push(Finding::error("reduced-link", path.display().to_string(), error)),
-        error => findings.push(Finding::error("model", path.display().to_string(), error)),
+        Error::File { path, what } => findings.push(error("missing-file", path.display().to_string(), &what)),
+        Error::Flex(cause) => findings.push(error("reduced-link", file, &cause)),
+        cause => findings.push(error("model", file, &cause)),
     }
 }
 
@@ -198,8 +149,8 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
     let gives_way = robot.drives.iter().any(|d| d.kind != DriveKind::Prescribed);
     if robot.flexible_links.is_empty() && !gives_way && !robot.is_mounted() {
         let message = "no link is flexible and no drive is elastic: compare will find no deflection";
-        let help = "add [[flexible_link]] or [[drive]] entries to a robot.toml".into();
-        findings.push(Finding { help, ..Finding::note("no-flexible-link", file.clone(), message.into()) });
+        let help = "add [[flexible_link]] or [[drive]] entries to a robot.toml";
+        findings.push(Finding::warning("no-flexible-link", &file, message, help).as_note());
     }
     let posed = standing_pose(robot, motion).and_then(|at| {
         let posed = Posed::new(robot.model(&Modelling::default())?, at)?;
@@ -207,7 +158,7 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
         Ok((posed, linear))
     });
     match posed {
-        Err(error) => findings.push(Finding::error("no-equilibrium", file, &error)),
+        Err(cause) => findings.push(error("no-equilibrium", file, &cause)),
         Ok((posed, linear)) => {
             let words = motion.map_or_else(
                 || "in the middle of the joint ranges".to_owned(),
@@ -216,13 +167,13 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
             let hz = posed.plant.modes.frequencies_hz();
             if !hz.is_empty() {
                 let message = format!("first frequencies {words} {:.2?} Hz", &hz[..hz.len().min(4)]);
-                findings.push(Finding::note("modes", file, message));
+                findings.push(Finding::warning("modes", file, message, "").as_note());
             }
-            if let Err(error) = StressMonitor::new(&posed.arm, &posed.plant) {
-                findings.push(Finding::error("stress", robot.path.display().to_string(), &error));
+            if let Err(cause) = StressMonitor::new(&posed.arm, &posed.plant) {
+                findings.push(error("stress", robot.path.display().to_string(), &cause));
             }
             let caveats = posed.arm.link_caveats().into_iter().chain(posed.validity(&linear));
-            findings.extend(caveats.map(|caveat| Finding::caveat(&robot.path, caveat)));
+            findings.extend(caveats.map(|caveat| about(&robot.path, caveat)));
         }
     }
 }
@@ -231,23 +182,22 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
 fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &mut Vec<Finding>) -> Option<Motion> {
     let file = || path.display().to_string();
     match crate::Motion::load_with(path, robot, options) {
-        Err(error) => {
-            findings.push(Finding::error("trajectory", file(), &error));
+        Err(cause) => {
+            findings.push(error("trajectory", file(), &cause));
             None
         }
         Ok(motion) => {
             let help = "slow the motion down or keep away from the limit";
             let likely = || motion.likely.to_owned();
-            let passed =
-                |v| Finding { help: help.into(), likely: likely(), ..Finding::error("joint-limit", file(), v) };
+            let passed = |v| Finding { help: help.into(), likely: likely(), ..error("joint-limit", file(), v) };
             findings.extend(motion.violations.iter().map(|v| passed(v)));
             let closed = robot.rigid_model().map(|model| loops::along_motion(&model, &motion.trajectory).err());
-            findings.extend(closed.ok().flatten().map(|e| Finding::error("loop", file(), &e)));
+            findings.extend(closed.ok().flatten().map(|e| error("loop", file(), &e)));
             let balancers = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
-            findings.extend(balancers.ok().and_then(Result::err).map(|e| Finding::error("balancer", file(), &e)));
+            findings.extend(balancers.ok().and_then(Result::err).map(|e| error("balancer", file(), &e)));
             let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));
             let caveats = motion.caveats().into_iter().chain(along.unwrap_or_default());
-            findings.extend(caveats.map(|caveat| Finding::caveat(path, caveat)));
+            findings.extend(caveats.map(|caveat| about(path, caveat)));
             Some(motion)
         }
     }

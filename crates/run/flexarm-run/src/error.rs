@@ -5,24 +5,20 @@
 //! ([`flexarm_settings::name_settings`]). The treatment of an error, such as the exit code of a
 //! process, is up to the interface.
 
-mod model;
+mod loops;
 mod picture;
 mod recording;
-mod value;
 
 use std::path::PathBuf;
 
 use flexarm_files::{FileError, TextFileError as RobotFileError};
 use flexarm_linkmaker::LinkError;
-use flexarm_settings::{Setting, known_names};
+use flexarm_settings::{OutOfRange, Setting, known_names};
 
 pub use flexarm_settings::Fault;
-pub use model::{
-    BalancerError, ChannelError, LinkFormError, LoadError, LoopError, ModellingError, PayloadError, PoseError,
-};
+pub use loops::LoopError;
 pub(crate) use picture::NoPicture;
-pub use recording::{RecordingError, StudyError};
-pub use value::ValueError;
+pub use recording::RecordingError;
 
 /// Any error that prevents a result.
 #[derive(Debug, thiserror::Error)]
@@ -112,30 +108,24 @@ pub enum Error {
         /// Whether [`Setting::Output`] selects it.
         movable: bool,
     },
-    /// An option has an invalid value.
-    #[error(transparent)]
-    Value(#[from] ValueError),
-    /// Links or drives cannot be modelled as requested.
-    #[error(transparent)]
-    Modelling(#[from] ModellingError),
-    /// Joint values do not fit the robot, or a pose has no solution.
-    #[error(transparent)]
-    Pose(#[from] PoseError),
-    /// A balancer does not fit the robot or a pose.
-    #[error(transparent)]
-    Balancer(#[from] BalancerError),
+    /// An option, a channel of a response or the runs of a study are invalid: what was found, what was
+    /// expected and the remedy.
+    #[error("{0}")]
+    Value(String),
+    /// Links or drives cannot be modelled as requested, or a balancer does not fit: what was found,
+    /// what was expected and the remedy.
+    #[error("{0}")]
+    Modelling(String),
+    /// Joint values do not fit the robot, or a pose has no solution: what was found, what was expected
+    /// and the remedy.
+    #[error("{0}")]
+    Pose(String),
     /// A closed loop does not fit the robot, or does not close at a pose.
     #[error(transparent)]
     Loop(#[from] LoopError),
-    /// Inputs or outputs of a frequency response are invalid.
-    #[error(transparent)]
-    Channel(#[from] ChannelError),
-    /// A load has invalid values.
-    #[error(transparent)]
-    Load(#[from] LoadError),
-    /// The runs of a study are invalid.
-    #[error(transparent)]
-    Study(#[from] StudyError),
+    /// A load or a change of payload is invalid: what was found, what was expected and the remedy.
+    #[error("{0}")]
+    Load(String),
     /// A recording cannot be read, written or reported as requested.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -200,6 +190,28 @@ impl std::error::Error for Box<dyn ExternalError> {
 }
 
 impl Error {
+    /// Error about a number that is not finite; `what` names the quantity.
+    pub(crate) fn not_finite(what: &str, found: f64) -> Self {
+        Self::Value(format!("{what} has the entry {found}, expected finite numbers"))
+    }
+
+    /// Error about joint values of a motion that do not fit its times.
+    pub(crate) fn samples(found: usize, times: usize, joints: usize) -> Self {
+        Self::Pose(format!(
+            "{found} joint values are given for {times} times; the robot has {joints} joints, so {} are expected",
+            joints * times
+        ))
+    }
+
+    /// Error of a study of a robot whose TCP has no error.
+    pub fn nothing_yields() -> Self {
+        Self::Value(
+            "the robot has no flexible link and no elastic drive: its tool is where the rigid arm has it, and \
+             nothing changes that; add [[flexible_link]] or [[drive]] entries"
+                .into(),
+        )
+    }
+
     /// Returns the error of type `E` inside [`Error::External`], if there is one.
     pub fn external<E: ExternalError>(&self) -> Option<&E> {
         match self {
@@ -243,10 +255,17 @@ fn assumed(notes: &[String]) -> String {
     }
 }
 
+impl From<OutOfRange> for Error {
+    fn from(error: OutOfRange) -> Self {
+        Self::Value(error.to_string())
+    }
+}
+
 impl From<FileError> for Error {
     fn from(error: FileError) -> Self {
         match error {
             FileError::Unusable { path, what } => Self::File { path, what },
+            FileError::Text(error) => Self::RobotFile(error),
             FileError::Taken { path, place, movable } => Self::Taken { path, place, movable },
             FileError::Write { path, source } => Self::Write { path, source },
         }

@@ -40,12 +40,9 @@ pub use arm::operating_points::OperatingPoints;
 pub use arm::options::{DriveModel, LinkModel, Modelling, Outputs, RunOptions};
 pub use arm::recursions::Recursions;
 pub use arm::{Arm, Owner};
-pub use caveat::{Caveat, Severity};
-pub use check::{Finding, check, check_with_loads, check_with_motion};
-pub use error::{
-    BalancerError, ChannelError, Error, ExternalError, Fault, LinkFormError, LoadError, LoopError, ModellingError,
-    PayloadError, PoseError, RecordingError, StudyError, ValueError,
-};
+pub use caveat::{Finding, Severity};
+pub use check::{check, check_with_loads, check_with_motion};
+pub use error::{Error, ExternalError, Fault, LoopError, RecordingError};
 pub use flexarm_linkmaker::Stopwatch;
 pub use motions::applied_load::AppliedLoad;
 pub use motions::motion::{HeldJoint, Motion};

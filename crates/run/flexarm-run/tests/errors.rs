@@ -2,7 +2,7 @@
 
 use std::error::Error as _;
 
-use flexarm_run::{Error, ExternalError, Fault, ValueError};
+use flexarm_run::{Error, ExternalError, Fault};
 
 #[derive(Debug, thiserror::Error)]
 #[error("no depth")]
@@ -20,5 +20,5 @@ fn an_error_of_a_study_keeps_its_text_its_cause_and_its_fault() {
     assert_eq!((error.to_string(), error.fault()), ("no depth".into(), Fault::Run));
     assert_eq!(error.source().map(ToString::to_string), Some(std::fmt::Error.to_string()));
     assert!(error.external::<OfAStudy>().is_some());
-    assert!(Error::from(ValueError::NothingYields).external::<OfAStudy>().is_none());
+    assert!(Error::nothing_yields().external::<OfAStudy>().is_none());
 }

@@ -3,35 +3,35 @@
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
 
-use flexarm_run::Caveat;
-use flexarm_run::caveat::CaveatKind;
+use flexarm_run::Finding;
+use flexarm_run::caveat::FindingKind;
 use flexarm_run::caveat::slip::{self, Factor};
 
 use crate::CuttingTool;
 
 /// Diameter of a cutter outside the usual range.
-const TOOL_DIAMETER: CaveatKind = CaveatKind::warning(
+const TOOL_DIAMETER: FindingKind = FindingKind::warning(
     "tool-diameter",
     "the cutter of {where} has a diameter of {value} m, the usual range ends at {yardstick} m",
     "m",
     "check diameter and lengths in the tool file",
 );
 /// Natural frequency of a tool's mode outside the usual range.
-const TOOL_FREQUENCY: CaveatKind = CaveatKind::warning(
+const TOOL_FREQUENCY: FindingKind = FindingKind::warning(
     "tool-frequency",
     "{where} has a natural frequency of {value} Hz, the usual range of tools and spindles ends at {yardstick} Hz",
     "Hz",
     "frequencies of modes are in Hz",
 );
 /// Stiffness of a tool's mode outside the usual range.
-const TOOL_STIFFNESS: CaveatKind = CaveatKind::warning(
+const TOOL_STIFFNESS: FindingKind = FindingKind::warning(
     "tool-stiffness",
     "{where} has a stiffness of {value} N/m, the usual range of tools and spindles ends at {yardstick} N/m",
     "N/m",
     "the stiffness of a mode is in N/m, its mass in kg",
 );
 /// Damping ratio of a tool's mode outside the usual range.
-const TOOL_DAMPING: CaveatKind = CaveatKind::warning(
+const TOOL_DAMPING: FindingKind = FindingKind::warning(
     "tool-damping",
     "{where} has a damping ratio of {value}, the usual range of tools and spindles ends at {yardstick}",
     "",
@@ -39,28 +39,28 @@ const TOOL_DAMPING: CaveatKind = CaveatKind::warning(
 );
 
 /// Number of teeth that no milling cutter has.
-const TOOL_TEETH: CaveatKind = CaveatKind::warning(
+const TOOL_TEETH: FindingKind = FindingKind::warning(
     "tool-teeth",
     "the cutter of {where} has {value} teeth, milling cutters end at {yardstick}",
     "",
     "teeth is the number of teeth on the circumference",
 );
 /// Modal mass of a tool outside the usual range.
-const TOOL_MASS: CaveatKind = CaveatKind::warning(
+const TOOL_MASS: FindingKind = FindingKind::warning(
     "tool-mass",
     "{where} has a modal mass of {value} kg, the usual range of tools and spindles ends at {yardstick} kg",
     "kg",
     "mass and stiffness of a mode belong together: k = m (2 pi f)^2",
 );
 /// Arc of engagement so small that hardly anything is cut.
-const TOOL_ENGAGEMENT: CaveatKind = CaveatKind::warning(
+const TOOL_ENGAGEMENT: FindingKind = FindingKind::warning(
     "tool-engagement",
     "a tooth of {where} cuts over {value} rad of a turn, the usual range ends at {yardstick} rad",
     "rad",
     "ae is in the lengths of the file, immersion is a ratio to the diameter",
 );
 /// Maximum depth of the search far below the diameter.
-const TOOL_DEEPEST: CaveatKind = CaveatKind::warning(
+const TOOL_DEEPEST: FindingKind = FindingKind::warning(
     "tool-deepest",
     "limits of {where} are sought up to {value} times its diameter only, less than {yardstick}",
     "",
@@ -81,10 +81,10 @@ const TOO_SOFT: &[Factor] = &[(1e-6, "N/um"), (1e-3, "N/mm")];
 const TOO_DAMPED: &[Factor] = &[(100.0, "per cent")];
 
 /// Returns the caveats about properties of a tool outside the usual ranges.
-pub fn tool_caveats(tool: &CuttingTool) -> Vec<Caveat> {
+pub fn tool_caveats(tool: &CuttingTool) -> Vec<Finding> {
     let name = format!("the tool {:?}", tool.name);
     let mut found = Vec::new();
-    let mut check = |kind: &CaveatKind, whose: &str, value: f64, usual: &RangeInclusive<f64>, factors: &[Factor]| {
+    let mut check = |kind: &FindingKind, whose: &str, value: f64, usual: &RangeInclusive<f64>, factors: &[Factor]| {
         if !usual.contains(&value) {
             let yardstick = if value < *usual.start() { *usual.start() } else { *usual.end() };
             found.push(kind.found(whose, value, yardstick).likely(slip::slip(value, usual, factors, 1.0)));

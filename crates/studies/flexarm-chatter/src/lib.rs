@@ -36,7 +36,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use flexarm_run::caveat::of_use;
-use flexarm_run::{Caveat, Error, Modelling, Motion, Robot, ValueError, caveat};
+use flexarm_run::{Error, Finding, Modelling, Motion, Robot, caveat};
 
 pub use crate::milling::ChatterError;
 pub use caveats::tool_caveats;
@@ -107,7 +107,7 @@ pub struct Lobes {
     /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
     /// Caveats about the input and the validity of the result.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Stability limit.
@@ -300,14 +300,14 @@ fn check_speeds(rpm: &[f64]) -> Result<(), Error> {
     if let Some(found) = rpm.iter().copied().find(|rpm| !(rpm.is_finite() && *rpm > 0.0)) {
         return Err(LobesError::Speed { found }.into());
     }
-    Ok(Quantity::SPEED.check_all("the spindle speed", rpm).map_err(ValueError::from)?)
+    Ok(Quantity::SPEED.check_all("the spindle speed", rpm)?)
 }
 
 fn check_deepest(depth_m: f64) -> Result<(), Error> {
     if !(depth_m.is_finite() && depth_m > 0.0) {
         return Err(LobesError::Deepest { found: depth_m }.into());
     }
-    Quantity::LENGTH.check("the maximum depth of cut", depth_m).map_err(ValueError::from)?;
+    Quantity::LENGTH.check("the maximum depth of cut", depth_m)?;
     Ok(())
 }
 

@@ -11,7 +11,7 @@ use super::LobesError;
 use super::tool_file::{CuttingTool, ToolDirection};
 use flexarm_run::posed::Posed;
 use flexarm_run::response::pose_in_words;
-use flexarm_run::{Caveat, Error, Modelling, Motion, Robot, TCP_FRAME};
+use flexarm_run::{Error, Finding, Modelling, Motion, Robot, TCP_FRAME};
 
 /// Minimum number of poses along a motion.
 const MIN_PLACES: usize = 2;
@@ -139,7 +139,7 @@ impl CutPose {
     }
 
     /// Returns the caveats about the robot and its pose.
-    pub(super) fn caveats(&self) -> Vec<Caveat> {
+    pub(super) fn caveats(&self) -> Vec<Finding> {
         self.posed.caveats_of(&self.linear, &[0.0; 6])
     }
 }

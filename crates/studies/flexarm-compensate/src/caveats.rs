@@ -6,7 +6,7 @@ use flexarm_trajectory::Extreme;
 
 use super::job::{Commands, Discarded};
 use super::{CompensateRequest, Compensation, Method, limits};
-use flexarm_run::{Arm, Caveat, MotionViolation, Robot};
+use flexarm_run::{Arm, Finding, MotionViolation, Robot};
 
 /// Minimum remaining fraction of the model's peak error that is explained, and minimum share of it
 /// above the cutoff frequency for that explanation.
@@ -15,14 +15,14 @@ const MOSTLY: f64 = 0.5;
 /// Fraction of the torque limit at which a servo counts as saturated.
 const AT_LIMIT: f64 = 1.0 - 1e-9;
 
-/// Caveat about poses where the joints cannot correct all requested components.
-fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Caveat> {
+/// Finding about poses where the joints cannot correct all requested components.
+fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Finding> {
     (directions < asked).then(|| {
         let text = format!(
             "at {t_s:.2} s the joints can move the TCP in only {directions} of the {asked} requested directions (a \
              singular pose, or too few joints): the others are corrected little or not at all"
         );
-        Caveat::from_message(
+        Finding::warning(
             "singular",
             "compensation",
             text,
@@ -31,8 +31,8 @@ fn singular_caveat((t_s, directions): (f64, usize), asked: usize) -> Option<Cave
     })
 }
 
-/// Caveat about more than a hundredth of the peak left on the model because the motion is too fast.
-fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
+/// Finding about more than a hundredth of the peak left on the model because the motion is too fast.
+fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Finding> {
     let (first, hz) = (answer.model_peaks_m.first()?, answer.cutoff_hz?);
     let least = answer.model_peaks_m.iter().copied().fold(f64::INFINITY, f64::min);
     (answer.iterations > 0 && least > ENOUGH_LEFT * first && quicker > MOSTLY).then(|| {
@@ -42,13 +42,13 @@ fn quick_caveat(answer: &Compensation, quicker: f64) -> Option<Caveat> {
             100.0 * least / first,
             100.0 * quicker
         );
-        Caveat::from_message("too-quick", "compensation", text, "make the motion slower or its accelerations smoother")
+        Finding::warning("too-quick", "compensation", text, "make the motion slower or its accelerations smoother")
     })
 }
 
-/// Caveat about discarded iterations, which increased the error on the model, with the cutoff
+/// Finding about discarded iterations, which increased the error on the model, with the cutoff
 /// frequency of those kept.
-fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Caveat> {
+fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Finding> {
     let each = |of: &Discarded| match of.growth.is_finite() {
         true => {
             format!("iteration {} (up to {:.1} Hz) multiplied it by {:.3}", of.iteration, of.cutoff_hz, of.growth)
@@ -63,7 +63,7 @@ fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Ca
     (!named.is_empty()).then(|| {
         let text =
             format!("iterations that increase the RMS error on the model are discarded: {}; {kept}", named.join(", "));
-        let caveat = Caveat::from_message(
+        let caveat = Finding::warning(
             "discarded",
             "compensation",
             text,
@@ -73,8 +73,8 @@ fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Ca
     })
 }
 
-/// Caveat about saturated servos of the plant: commands cannot compensate for missing torque.
-pub(super) fn of_servos(plant: &Arc<Arm>, efforts: &[Extreme]) -> Option<Caveat> {
+/// Finding about saturated servos of the plant: commands cannot compensate for missing torque.
+pub(super) fn of_servos(plant: &Arc<Arm>, efforts: &[Extreme]) -> Option<Finding> {
     let joints: Vec<&str> = plant.joints().collect();
     let at_limit = plant.servo_limits().filter_map(|(k, limit)| {
         let worst = efforts.get(k).filter(|worst| worst.value.abs() >= AT_LIMIT * limit)?;
@@ -86,7 +86,7 @@ pub(super) fn of_servos(plant: &Arc<Arm>, efforts: &[Extreme]) -> Option<Caveat>
             "servos are at their torque limits: {}: the error due to the missing torque is not corrected",
             named.join(", ")
         );
-        Caveat::from_message("servo-limit", "compensation", text, "slow the motion down where it is fastest")
+        Finding::warning("servo-limit", "compensation", text, "slow the motion down where it is fastest")
     })
 }
 
@@ -99,12 +99,12 @@ pub(super) fn of(
     robot: &Robot,
     found: &Commands,
     request: &CompensateRequest,
-) -> Vec<Caveat> {
+) -> Vec<Finding> {
     let mut caveats = Vec::new();
     let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
     if !worse.is_empty() {
         let text = format!("the new commands exceed limits that the original motion satisfies: {}", worse.join("; "));
-        caveats.push(Caveat::from_message("limits", "compensation", text, "slow the motion down a little"));
+        caveats.push(Finding::warning("limits", "compensation", text, "slow the motion down a little"));
     }
     let unknown: Vec<&str> = robot
         .drives
@@ -117,9 +117,8 @@ pub(super) fn of(
             "errors due to backlash and friction of {} are not corrected: they depend on the direction of approach",
             unknown.join(", ")
         );
-        caveats.push(
-            Caveat::from_message("play", "compensation", text, "approach every point from the same side").as_note(),
-        );
+        caveats
+            .push(Finding::warning("play", "compensation", text, "approach every point from the same side").as_note());
     }
     // Shaping alone is not meant to reduce the error.
     let corrected = request.method == Method::Static || request.iterations > 0;
@@ -129,7 +128,7 @@ pub(super) fn of(
             1e3 * answer.after.peak_m,
             1e3 * answer.before.peak_m
         );
-        caveats.push(Caveat::from_message(
+        caveats.push(Finding::warning(
             "little-gained",
             "compensation",
             text,

@@ -9,7 +9,7 @@ use flexarm_log::RecordingFormat;
 use super::program::{self, Corrected, ProgramFigures};
 use super::{CompensateRequest, Compensation, MotionPair, SAMPLE_S, page};
 use flexarm_run::motion_report::{check_motion_outputs, motion_texts};
-use flexarm_run::{Arm, Caveat, Error, Motion, Robot, Scenario};
+use flexarm_run::{Arm, Error, Finding, Motion, Robot, Scenario};
 
 /// Tolerance for the TCP position at corrected targets (m), for the rounding of written digits.
 const WRITTEN_WITHIN_M: f64 = 1e-6;
@@ -53,7 +53,7 @@ impl Files {
     ) -> Option<Corrected> {
         let place = self.program.as_ref()?;
         let mut warn = |text: String, help: &str| {
-            answer.caveats.push(Caveat::from_message("program", "compensation", text, help));
+            answer.caveats.push(Finding::warning("program", "compensation", text, help));
         };
         let (corrected, uncovered) = match program::corrected(robot, arm, scenario, request, place) {
             Ok(found) => found,

@@ -194,7 +194,11 @@ impl<'a> Job<'a> {
             let row = t.partition_point(|x| *x < time - 0.5 * self.step_s()).min(t.len() - 1);
             let off = (t[row] - time).abs();
             if off > LOGGED_WITHIN * self.step_s() {
-                return Err(CompensateError::Logged { t_s: *time, off_s: off }.into());
+                let message = format!(
+                    "the run has no sample at {t_s} s (off by {off:.1e} s): choose a step that divides 0.001 s",
+                    t_s = *time
+                );
+                return Err(CompensateError::Input(message).into());
             }
             let place = Translation3::new(p[3 * row], p[3 * row + 1], p[3 * row + 2]);
             let turn = Quaternion::new(r[4 * row], r[4 * row + 1], r[4 * row + 2], r[4 * row + 3]);
@@ -254,7 +258,12 @@ impl<'a> Job<'a> {
         match axes.find(|axis| axis.position_gain * axis.velocity_gain <= 0.0) {
             Some(axis) => {
                 let joint = self.motion.trajectory.joints()[axis.coordinate].clone();
-                Err(CompensateError::NothingHolds { joint }.into())
+                Err(CompensateError::Input(format!(
+                    "the servo of joint {joint:?} does not control position, so that no targets can be computed for \
+                     it: set its position_gain and velocity_gain, or use motors that follow their commands exactly \
+                     (drives = elastic)"
+                ))
+                .into())
             }
             None => Ok(plant),
         }
@@ -363,7 +372,8 @@ impl<'a> Job<'a> {
             let q: Vec<f64> = self.q.column(*k).iter().copied().collect();
             let found =
                 static_targets(&plant, &self.arm.tcp, &q, &Wrench::zeros(), self.times[*k], &self.request.components);
-            let found = found.map_err(|source| CompensateError::Target { t_s: self.times[*k], source })?;
+            let t = self.times[*k];
+            let found = found.map_err(|source| CompensateError::Input(format!("at {t:.3} s: {source}")))?;
             Ok::<_, Error>(DVector::from_iterator(m, found.q.iter().zip(&q).map(|(new, old)| new - old)))
         };
         let found: Vec<DVector<f64>> = nodes.par_iter().map(one).collect::<Result<_, Error>>()?;

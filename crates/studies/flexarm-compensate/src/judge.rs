@@ -35,7 +35,10 @@ impl Judge {
         let names = |arm: &Arc<Arm>| arm.joints().map(str::to_owned).collect::<Vec<_>>();
         let (found, expected) = (names(&judge.arm), names(arm));
         if found != expected {
-            return Err(CompensateError::OtherJoints { found, expected }.into());
+            return Err(CompensateError::Input(format!(
+                "the plant has the joints {found:?}, the robot {expected:?}: they must be the same"
+            ))
+            .into());
         }
         Ok(judge)
     }

@@ -46,7 +46,7 @@ use serde::Serialize;
 pub use error::CompensateError;
 use files::Files;
 use flexarm_run::caveat::{Use, once_each, warnings};
-use flexarm_run::{Arm, Caveat, Error, Modelling, Motion, MotionViolation, Robot, RunOptions, Scenario};
+use flexarm_run::{Arm, Error, Finding, Modelling, Motion, MotionViolation, Robot, RunOptions, Scenario};
 use job::Job;
 use judge::{Judge, sweep};
 pub use limits::LimitRule;
@@ -205,7 +205,7 @@ pub struct Compensation {
     /// Messages of the caveats.
     pub warnings: Vec<String>,
     /// Caveats.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// The commands, for callers in the same process.
     #[serde(skip)]
     pub trajectory: Arc<Trajectory>,
@@ -344,47 +344,63 @@ fn attempt(
 }
 
 fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Result<(), CompensateError> {
+    let value = |what: &str, found: f64, expected: &str| {
+        CompensateError::Input(format!("{what} is {found}, expected {expected}"))
+    };
     let motion = &scenario.motion;
     if !request.components.contains(&true) {
-        return Err(CompensateError::NoComponent);
+        return Err(CompensateError::Input(
+            "no TCP component is selected: select at least one of x, y, z, rx, ry, rz".into(),
+        ));
     }
     if let Some(hz) = request.cutoff_hz.filter(|hz| !(hz.is_finite() && *hz > 0.0)) {
-        return Err(CompensateError::Value { what: "the cutoff", found: hz, expected: "a positive frequency (Hz)" });
+        return Err(value("the cutoff", hz, "a positive frequency (Hz)"));
     }
     let found = request.run.step_s;
     if !(found > 0.0 && found <= LONGEST_STEP_S) {
-        return Err(CompensateError::Value { what: "the step", found, expected: "a time of at most 0.004 s" });
+        return Err(value("the step", found, "a time of at most 0.004 s"));
     }
     if let Some(hz) = request.cutoff_hz.filter(|hz| *hz > 0.5 / found) {
         let expected = "at most half the number of steps per second (Hz)";
-        return Err(CompensateError::Value { what: "the cutoff", found: hz, expected });
+        return Err(value("the cutoff", hz, expected));
     }
     let found = motion.trajectory.duration();
     if found > LONGEST_S {
-        return Err(CompensateError::Value { what: "the duration of the motion", found, expected: "at most 600 s" });
+        return Err(value("the duration of the motion", found, "at most 600 s"));
     }
     if request.iterations > MAX_ITERATIONS {
         let found = request.iterations as f64;
-        return Err(CompensateError::Value { what: "the number of iterations", found, expected: "at most 100" });
+        return Err(value("the number of iterations", found, "at most 100"));
     }
     let (found, expected) = (request.accelerations.len(), arm.joints().count());
     if found != 0 && found != expected {
-        return Err(CompensateError::Accelerations { found, expected });
+        return Err(CompensateError::Input(format!(
+            "{found} acceleration limits for a robot of {expected} joints: expected one per joint"
+        )));
     }
     if let Some(found) = request.accelerations.iter().copied().find(|limit| limit.is_nan() || *limit <= 0.0) {
         let expected = "a positive number (rad/s2 or m/s2)";
-        return Err(CompensateError::Value { what: "an acceleration limit", found, expected });
+        return Err(value("an acceleration limit", found, expected));
     }
     if let Some(change) = scenario.payloads.iter().find(|change| request.method == Method::Static && change.at_s > 0.0)
     {
-        return Err(CompensateError::StaticPayload { at_s: change.at_s });
+        let message = format!(
+            "the payload changes at {at_s} s, but the static method supports only one payload: use the dynamic \
+             method, or compensate each part of the motion separately",
+            at_s = change.at_s
+        );
+        return Err(CompensateError::Input(message));
     }
     if arm.springs.is_empty() && !arm.has_servo() {
-        return Err(CompensateError::NothingYields);
+        return Err(CompensateError::nothing_yields());
     }
     // Static equilibria do not depend on velocities, so the static method accepts velocity jumps.
     match motion.trajectory.velocity_jumps().first() {
-        Some(jump) if request.method == Method::Dynamic => Err(CompensateError::Corner { t_s: jump.time_s }),
+        Some(jump) if request.method == Method::Dynamic => Err(CompensateError::Input(format!(
+            "the velocity jumps at {t_s} s, which the dynamic method cannot correct: start and end the motion at \
+             rest and blend its corners, or use the static method",
+            t_s = jump.time_s
+        ))),
         _ => Ok(()),
     }
 }

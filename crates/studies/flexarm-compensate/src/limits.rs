@@ -8,7 +8,7 @@ use flexarm_trajectory::{Extreme, JointLimits};
 use super::{CompensateError, CompensateRequest, Compensation, MotionPair, Stop, attempt};
 use flexarm_run::motion::limits as limits_of;
 use flexarm_run::motion_report::{of_effort, of_limit};
-use flexarm_run::{Arm, Caveat, Error, Motion, MotionViolation, Robot, Scenario};
+use flexarm_run::{Arm, Error, Finding, Motion, MotionViolation, Robot, Scenario};
 
 /// Increase of a violation over that of the motion itself, as a fraction of the limit, up to which
 /// it counts as the motion's own.
@@ -88,7 +88,7 @@ pub(super) fn kept(
         if slowed > 1.0 {
             let text = format!("the motion is slowed down by a factor of {slowed:.4} to satisfy joint limits");
             let help = "allow violations (`limits` = tell), or slow the motion down where it is fastest";
-            answer.caveats.push(Caveat::from_message("slowed", "compensation", text, help));
+            answer.caveats.push(Finding::warning("slowed", "compensation", text, help));
         }
         let worse: Vec<MotionViolation> = worse(&answer.limits, &own).cloned().collect();
         if worse.is_empty() || request.limits == LimitRule::Tell {
@@ -120,8 +120,16 @@ fn slower(limit: &MotionViolation) -> f64 {
 }
 
 fn refused(worse: &[MotionViolation], rule: LimitRule) -> CompensateError {
-    CompensateError::Limits {
-        limits: worse.iter().map(|limit| limit.message.clone()).collect(),
-        slower: rule == LimitRule::Slow,
-    }
+    let limits: Vec<&str> = worse.iter().map(|limit| &*limit.message).collect();
+    let limits = limits.join("; ");
+    let remedy = match rule == LimitRule::Slow {
+        true => {
+            "a slower motion does not help, or loads fix its timing: change the motion there, or accept the \
+             violation (`limits` = tell)"
+        }
+        false => "slow the motion down (`limits` = slow), or accept the violation (tell)",
+    };
+    CompensateError::Input(format!(
+        "the new commands exceed limits that the original motion satisfies: {limits}; {remedy}"
+    ))
 }

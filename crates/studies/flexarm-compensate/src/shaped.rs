@@ -79,7 +79,7 @@ pub struct ShapedModeFigures {
 pub(super) fn shaped(arm: &Arc<Arm>, scenario: &Scenario, shaping: Shaping) -> Result<(Motion, ShaperFigures), Error> {
     let motion = &scenario.motion;
     let end = AtEnd::of(arm, scenario)?;
-    let Some(first) = end.modes.first() else { return Err(CompensateError::NothingYields.into()) };
+    let Some(first) = end.modes.first() else { return Err(CompensateError::nothing_yields().into()) };
     let (hz, ratio) = (first.frequency_hz(), first.damping_ratio());
     let (kind, shaper, band, modes) = match shaping {
         Shaping::Mode(kind) => {

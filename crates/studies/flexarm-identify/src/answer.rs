@@ -14,8 +14,8 @@ use super::doubts::caveats;
 use super::encoders::EncoderFigures;
 use super::error::IdentifyFileError;
 use super::file::MeasurementInput;
-use flexarm_run::Caveat;
 use flexarm_run::Error;
+use flexarm_run::Finding;
 use flexarm_run::Robot;
 
 /// Maximum number of suspicious readings in the result.
@@ -68,7 +68,7 @@ pub struct Identification {
     /// Path of the page.
     pub page: Option<String>,
     /// Caveats about the identification and the robot.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
     /// Descriptions of the instruments and targets.

@@ -6,12 +6,12 @@ use nalgebra::DVector;
 use super::answer::{Identification, rms};
 use super::encoders::EncoderFigures;
 use super::file::MeasurementInput;
-use flexarm_run::Caveat;
+use flexarm_run::Finding;
 use flexarm_run::Robot;
-use flexarm_run::caveat::CaveatKind;
+use flexarm_run::caveat::FindingKind;
 
 /// Measured displacements differ in magnitude from those of the robot.
-const LOAD_UNIT: CaveatKind = CaveatKind::warning(
+const LOAD_UNIT: FindingKind = FindingKind::warning(
     "load-unit",
     "measured displacements under {where} are {value} times the predicted ones, a difference by more than a factor of \
      {yardstick}: loads or initial stiffnesses are wrong",
@@ -19,7 +19,7 @@ const LOAD_UNIT: CaveatKind = CaveatKind::warning(
     "force is in the file's unit of force, mass in kg: a weight of 100 kg is mass = 100, or a force of 981 N",
 );
 /// The residual of an encoder exceeds its noise.
-const ENCODER_RESIDUAL: CaveatKind = CaveatKind::warning(
+const ENCODER_RESIDUAL: FindingKind = FindingKind::warning(
     "encoder-rest",
     "{where}: {value} rad (or m) of the deflection are not explained by the torque, the noise of the encoders is \
      {yardstick}: the standard deviation of the stiffness includes that, as if it followed the torque in part",
@@ -40,7 +40,7 @@ const ENCODER_REST: f64 = 1.5;
 /// suspect.
 const FRAME_RATIO: f64 = 0.05;
 
-pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
+pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
     let mut caveats = Vec::new();
     if let Some(factor) = found.misfit {
         let (cause, remedy) = match factor > 1.0 {
@@ -56,7 +56,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
         };
         let text =
             format!("the residuals are {factor:.2} times as large as the standard deviations of the readings: {cause}");
-        caveats.push(Caveat::from_message("misfit", "measurements", text, remedy));
+        caveats.push(Finding::warning("misfit", "measurements", text, remedy));
     }
     let unsure = |p: &&ParameterEstimate| !p.identifiable && !p.rigid;
     let unsure: Vec<&str> = found.parameters.iter().filter(unsure).map(|p| p.name.as_str()).collect();
@@ -68,7 +68,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
             grouped(&unsure)
         );
         let remedy = "add readings at the poses of a measurement plan, or keep values that you know";
-        caveats.push(Caveat::from_message("not-identifiable", "measurements", text, remedy));
+        caveats.push(Finding::warning("not-identifiable", "measurements", text, remedy));
     }
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {
         let text = format!(
@@ -76,7 +76,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
              deviations): there are too many parameters for these readings",
             held.rms, held.rms_initial
         );
-        caveats.push(Caveat::from_message(
+        caveats.push(Finding::warning(
             "over-fitted",
             "measurements",
             text,
@@ -85,7 +85,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Caveat> {
     }
     if !found.solution.converged {
         let text = "the fit did not converge: its values may be inaccurate";
-        caveats.push(Caveat::from_message("not-converged", "measurements", text, "use better initial values"));
+        caveats.push(Finding::warning("not-converged", "measurements", text, "use better initial values"));
     }
     caveats
 }
@@ -115,7 +115,7 @@ fn grouped(names: &[&str]) -> String {
 }
 
 /// Returns a caveat about gear effects that the fit does not include.
-pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
+pub(super) fn gear_caveat(robot: &Robot) -> Option<Finding> {
     let has = |drive: &&flexarm_run::Drive| {
         drive.gearbox.as_ref().is_some_and(|(_, gear)| gear.hysteresis.is_some() || !gear.transmission.is_empty())
     };
@@ -125,13 +125,13 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Caveat> {
             "the fit ignores hysteresis and transmission errors of {}: it models gears as springs",
             joints.join(", ")
         );
-        Caveat::from_message("gear-laws", "measurements", text, "apply every load from the same side").as_note()
+        Finding::warning("gear-laws", "measurements", text, "apply every load from the same side").as_note()
     })
 }
 
 /// Encoders whose residual exceeds their noise, and whose excess relative to the deflection exceeds
 /// the relative deviation of the stiffness.
-pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Caveat> + '_ {
+pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Finding> + '_ {
     let odd = |gear: &&EncoderFigures| {
         let more = (gear.rest_rms.powi(2) - gear.noise_rms.powi(2)).max(0.0).sqrt();
         let matters = more / gear.deflection_rms > gear.std / gear.stiffness;
@@ -145,7 +145,7 @@ pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item
 
 /// Displacements under forces, or under masses, that differ from the robot's by more than
 /// [`LOAD_RATIO`]. Checks whether the factor between N and kg explains the ratio.
-pub(super) fn load_caveats(nominal: &NominalArm, input: &MeasurementInput) -> Vec<Caveat> {
+pub(super) fn load_caveats(nominal: &NominalArm, input: &MeasurementInput) -> Vec<Finding> {
     let mut caveats = Vec::new();
     for (what, slip, pulls) in [("forces", "kg given as N", true), ("masses", "N given as kg", false)] {
         let some = input.measurements.of_readings(|k| match &input.measurements.readings[k].kind {
@@ -178,13 +178,13 @@ pub(super) fn load_caveats(nominal: &NominalArm, input: &MeasurementInput) -> Ve
 }
 
 /// Rows of tables of places without a reading.
-pub(super) fn empty_caveat(input: &MeasurementInput) -> Option<Caveat> {
+pub(super) fn empty_caveat(input: &MeasurementInput) -> Option<Finding> {
     let text = format!("{} rows of the tables have no place and are skipped", input.empty_rows);
-    (input.empty_rows > 0).then(|| Caveat::from_message("empty-rows", "measurements", text, "").as_note())
+    (input.empty_rows > 0).then(|| Finding::warning("empty-rows", "measurements", text, "").as_note())
 }
 
 /// Positions that do not fit the robot at any pose of the instrument.
-pub(super) fn frame_caveat(answer: &Identification) -> Option<Caveat> {
+pub(super) fn frame_caveat(answer: &Identification) -> Option<Finding> {
     let metres: Vec<usize> = (0..answer.compared.len()).filter(|k| answer.compared[*k].kind == "places").collect();
     if metres.is_empty() {
         return None;
@@ -199,6 +199,6 @@ pub(super) fn frame_caveat(answer: &Identification) -> Option<Caveat> {
              values, their order, signs or units, or the targets are not those of this robot",
             1e3 * left
         );
-        Caveat::from_message("frames", "measurements", text, "compare one pose by hand with the robot model (inspect)")
+        Finding::warning("frames", "measurements", text, "compare one pose by hand with the robot model (inspect)")
     })
 }

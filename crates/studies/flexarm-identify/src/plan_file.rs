@@ -14,8 +14,8 @@ use serde::Serialize;
 use super::plan_load::Efforts;
 use super::{IdentifyFileError, joints_of, nominal};
 use flexarm_run::Arm;
-use flexarm_run::Caveat;
 use flexarm_run::Error;
+use flexarm_run::Finding;
 use flexarm_run::Modelling;
 use flexarm_run::Robot;
 use flexarm_run::caveat::Use;
@@ -107,7 +107,7 @@ pub struct MeasurementPlan {
     /// Table to fill in.
     pub table: Option<String>,
     /// Caveats about the robot, as from `check`.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
 }
@@ -286,7 +286,7 @@ fn allowed(efforts: &Efforts, poses: usize, setups: &[Setup], least: usize) -> V
 }
 
 /// Returns the caveat about planned loads that exceed effort limits: joints, and their shares of them.
-fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Caveat> {
+fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Finding> {
     let (joint, share) = over.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let text = format!(
         "the loads of {} of {readings} readings exceed effort limits, that of joint {joint:?} by a factor of \
@@ -294,7 +294,7 @@ fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Caveat> {
         over.len()
     );
     let remedy = "give smaller forces, or none: then they follow from the limits";
-    Some(Caveat::from_message("plan-load", "plan", text, remedy))
+    Some(Finding::warning("plan-load", "plan", text, remedy))
 }
 
 /// Returns the best plan, and the one with the same number of candidates in their given order.

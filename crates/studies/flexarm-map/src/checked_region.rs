@@ -2,8 +2,8 @@
 
 use flexarm_kinematics::{Data, Model, forward_kinematics};
 use flexarm_run::robot::tcp_frame;
-use flexarm_run::{Caveat, Error, Robot, ValueError};
-use flexarm_settings::Quantity;
+use flexarm_run::{Error, Finding, Robot};
+use flexarm_settings::{Quantity, Setting, known_names};
 use nalgebra::{DVector, Rotation3};
 
 use crate::finder::Finder;
@@ -52,13 +52,19 @@ pub(super) fn region_of<'m>(
     model: &'m Model,
     near: &[f64],
     rotations: &[Rotation3<f64>],
-) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+) -> Result<(Region<'m>, Vec<Finding>), Error> {
     if let Some(edges) = request.workpiece_m {
         if !edges.iter().all(|edge| edge.is_finite() && *edge >= 0.0) {
-            return Err(MapError::Workpiece { found: edges }.into());
+            return Err(MapError::Input(format!(
+                "the edges of the workpiece must be zero or positive lengths, found {edges:?} m"
+            ))
+            .into());
         }
         if !matches!(request.region, MapRegion::Workspace(_)) {
-            return Err(MapError::WorkpieceWithoutGrid.into());
+            return Err(MapError::Input(
+                "a workpiece requires a grid of places: it cannot be combined with joint values or a motion".into(),
+            )
+            .into());
         }
     }
     match &request.region {
@@ -67,7 +73,7 @@ pub(super) fn region_of<'m>(
         MapRegion::Poses(poses) => poses::region(poses, model),
         MapRegion::Along { motion, points } => {
             if !(1..=MAX_PLACES).contains(points) {
-                return Err(MapError::Instants.into());
+                return Err(MapError::instants().into());
             }
             let (n, trajectory, points) = (near.len(), &motion.trajectory, *points);
             let end = trajectory.duration();
@@ -89,25 +95,32 @@ fn grid_region<'m>(
     model: &'m Model,
     near: &[f64],
     directions: usize,
-) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+) -> Result<(Region<'m>, Vec<Finding>), Error> {
     let found = match (workspace.keep_out_m, workspace.bounds) {
         (Some(radius), _) => radius,
         (None, Some(_)) => 0.0,
         (None, None) => column::radius(robot, model, near),
     };
     if !(found.is_finite() && found >= 0.0) {
-        return Err(MapError::KeepOut { found }.into());
+        return Err(MapError::Input(format!(
+            "the keep-out radius around the first joint must be zero or positive, found {found} m"
+        ))
+        .into());
     }
     let mut finder = Finder::new(model, tcp_frame(model), near.to_vec());
     let joints = finder.joints();
     if joints < 6 {
-        return Err(MapError::TooFewJoints { joints }.into());
+        let message = format!(
+            "the arm has {joints} joints, but reaching a TCP pose requires six: map it over joint values ({})",
+            Setting::MapJoints
+        );
+        return Err(MapError::Input(message).into());
     }
     let mut caveats = Vec::new();
     if !finder.is_closed() {
         let message = "the arm has no closed-form inverse kinematics: poses are found by search, which is \
                        slow and may miss branches, and places near the workspace boundary";
-        caveats.push(Caveat::from_message("searched-poses", "map", message, "map the arm over joint values"));
+        caveats.push(Finding::warning("searched-poses", "map", message, "map the arm over joint values"));
     }
     let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
     let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
@@ -116,42 +129,57 @@ fn grid_region<'m>(
     let grid = Grid::within(bounds, spacing)?;
     let queries = grid.places() as f64 * directions as f64;
     if queries > MAX_QUERIES {
-        return Err(MapError::TooManyDirections { found: queries, most: MAX_QUERIES }.into());
+        let message = format!(
+            "the map would search for {queries:.1e} TCP poses, at most {MAX_QUERIES:.0e} are allowed: use fewer \
+             directions, or increase {}",
+            Setting::GridSpacing
+        );
+        return Err(MapError::Input(message).into());
     }
     Ok((Region::Grid(grid, Box::new(finder), found), caveats))
 }
 
 /// Returns the product of the joint values, the first joint varying fastest.
-fn joint_region<'m>(ranges: &'m [JointRange], model: &Model, near: &[f64]) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+fn joint_region<'m>(
+    ranges: &'m [JointRange],
+    model: &Model,
+    near: &[f64],
+) -> Result<(Region<'m>, Vec<Finding>), Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     if ranges.is_empty() {
-        return Err(MapError::NoJoints.into());
+        return Err(MapError::Input("no joint is given for the map to vary".into()).into());
     }
     let (mut numbers, mut caveats, mut poses) = (Vec::new(), Vec::new(), 1.0);
     for range in ranges {
         let JointRange { joint, range: [first, last], points } = range;
-        let k = actuated.iter().position(|c| c.joint == *joint).ok_or_else(|| MapError::Joint {
-            found: joint.clone(),
-            known: actuated.iter().map(|c| c.joint.clone()).collect(),
+        let k = actuated.iter().position(|c| c.joint == *joint).ok_or_else(|| {
+            let known: Vec<String> = actuated.iter().map(|c| c.joint.clone()).collect();
+            let known = known_names(joint, &known);
+            MapError::Input(format!("there is no joint {joint:?} to vary; the joints are {known}"))
         })?;
         if numbers.contains(&k) {
-            return Err(MapError::JointTwice(joint.clone()).into());
+            return Err(MapError::Input(format!("joint {joint:?} is named twice")).into());
         }
         if !first.is_finite() || !last.is_finite() || *points == 0 {
-            return Err(MapError::JointRange { joint: joint.clone(), range: range.range, points: *points }.into());
+            let message = format!(
+                "joint {joint:?} has a range from {} to {} in {points} values: expected finite numbers and at least \
+                 one value",
+                range.range[0], range.range[1]
+            );
+            return Err(MapError::Input(message).into());
         }
-        Quantity::JOINT.check_all(&format!("joint {joint:?}"), &range.range).map_err(ValueError::from)?;
+        Quantity::JOINT.check_all(&format!("joint {joint:?}"), &range.range)?;
         let limits = actuated[k].limits;
         if first.min(*last) < limits.lower || first.max(*last) > limits.upper {
             let (lower, upper) = (limits.lower, limits.upper);
             let message = format!("the map moves joint {joint:?} beyond its limits {lower} to {upper}");
-            caveats.push(Caveat::from_message("outside-limits", joint, message, "reduce the range of the joint"));
+            caveats.push(Finding::warning("outside-limits", joint, message, "reduce the range of the joint"));
         }
         numbers.push(k);
         poses *= *points as f64;
     }
     if poses > MAX_PLACES as f64 {
-        return Err(MapError::TooMany { places: poses, most: MAX_PLACES }.into());
+        return Err(MapError::too_many(poses).into());
     }
     let near = near.to_vec();
     let values = move |pose: usize, q: &mut Vec<f64>| {

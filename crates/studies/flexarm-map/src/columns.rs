@@ -139,7 +139,7 @@ impl Layout {
     /// Returns the column by which poses are compared.
     ///
     /// # Errors
-    /// [`MapError::Quantity`] if there is no such result column.
+    /// [`MapError::Input`] if there is no such result column.
     pub(super) fn compared_by(&self, name: Option<&str>) -> Result<usize, MapError> {
         let usual = match (self.cuts, self.loaded) {
             (true, _) => "depth_m",
@@ -147,9 +147,10 @@ impl Layout {
             (false, false) => "compliance_worst_m_per_n",
         };
         let wanted = name.unwrap_or(usual);
-        self.columns.iter().position(|c| c.quantity && c.name == wanted).ok_or_else(|| MapError::Quantity {
-            found: wanted.to_owned(),
-            known: self.columns.iter().filter(|c| c.quantity).map(|c| c.name.clone()).collect(),
+        self.columns.iter().position(|c| c.quantity && c.name == wanted).ok_or_else(|| {
+            let known: Vec<&str> = self.columns.iter().filter(|c| c.quantity).map(|c| &*c.name).collect();
+            let known = known.join(", ");
+            MapError::Input(format!("the map has no quantity {wanted:?} to compare poses by; it has {known}"))
         })
     }
 }

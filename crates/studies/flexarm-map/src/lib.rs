@@ -43,7 +43,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_kinematics::Model;
-use flexarm_settings::Words;
+use flexarm_settings::{Setting, Words};
 use serde::Serialize;
 
 pub use columns::MapColumn;
@@ -74,7 +74,7 @@ use flexarm_run::caveat::motion::of_wrench;
 use flexarm_run::caveat::size::Size;
 use flexarm_run::inspect::joint_values;
 use flexarm_run::posed::check_wrench;
-use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, Scenario, caveat};
+use flexarm_run::{Arm, Error, Finding, Modelling, Robot, Scenario, caveat};
 
 /// Poses kept at each place, among all tool directions and branches of the inverse kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -181,7 +181,7 @@ pub struct Map {
     /// Messages of the caveats.
     pub warnings: Vec<String>,
     /// Probable errors of the input, and limits of the result's validity.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// All poses.
     #[serde(skip)]
     pub table: MapTable,
@@ -378,35 +378,51 @@ fn summed_up(
 /// Returns the reason why no pose can be compared with others.
 fn nothing_found(request: &MapRequest, table: &MapTable, taken: &Evaluation, by: usize, places: usize) -> MapError {
     match (&request.region, &taken.first_failure) {
-        _ if table.rows() > 0 => MapError::NothingToCompare { by: table.columns[by].name.clone() },
-        (_, Some(first)) => MapError::NoEquilibrium { poses: taken.poses, first: first.clone() },
-        (MapRegion::Workspace(w), None) => MapError::OutOfReach { places, axis: w.tool.axis },
-        (_, None) => MapError::Instants,
+        _ if table.rows() > 0 => {
+            let by = &table.columns[by].name;
+            let why = match by == "depth_m" {
+                true => ", because the feed of the tool is along its axis (feed = [...] in [tool])",
+                false => "",
+            };
+            MapError::Input(format!("none of the poses has a {by}{why}: compare by another quantity"))
+        }
+        (_, Some(first)) => MapError::Input(format!(
+            "none of the {poses} poses has an equilibrium; at the first: {first}",
+            poses = taken.poses
+        )),
+        (MapRegion::Workspace(w), None) => MapError::Input(format!(
+            "none of the {places} places is within reach with the tool pointing along {axis:?} (world) and all \
+             joints within their limits: try other values for {} or {}",
+            Setting::Bounds,
+            Setting::ToolAxis,
+            axis = w.tool.axis
+        )),
+        (_, None) => MapError::instants(),
     }
 }
 
 /// Returns the caveat that some poses have no equilibrium.
-fn no_equilibrium(taken: &Evaluation) -> Option<Caveat> {
+fn no_equilibrium(taken: &Evaluation) -> Option<Finding> {
     let Evaluation { poses, failed, .. } = taken;
     let first = taken.first_failure.as_ref()?;
     let message = format!("{failed} of {poses} poses have no equilibrium and are left out; at the first: {first}");
-    Some(Caveat::from_message("no-equilibrium", "map", message, "analyse one of them with statics"))
+    Some(Finding::warning("no-equilibrium", "map", message, "analyse one of them with statics"))
 }
 
 /// Returns the caveat that a workpiece fits nowhere.
-fn no_placement(edges: [f64; 3]) -> Caveat {
+fn no_placement(edges: [f64; 3]) -> Finding {
     let message =
         format!("the workpiece of {edges:?} m does not fit anywhere on the grid with all its places within reach");
-    Caveat::from_message("no-placement", "map", message, "use a smaller workpiece or more tool directions")
+    Finding::warning("no-placement", "map", message, "use a smaller workpiece or more tool directions")
 }
 
-fn unfinished(done: usize, places: usize) -> Caveat {
+fn unfinished(done: usize, places: usize) -> Finding {
     let message = format!("the map was stopped: {done} of {places} places are in it");
-    Caveat::from_message("map-stopped", "map", message, "run it to its end")
+    Finding::warning("map-stopped", "map", message, "run it to its end")
 }
 
 /// Returns a caveat if the map has a single place, so that there is nothing to compare.
-fn one_place(found: &Map) -> Option<Caveat> {
+fn one_place(found: &Map) -> Option<Finding> {
     let message = match (found.reachable, found.points) {
         (1, 1) => "the map has only one place: its best and worst poses do not characterise the workspace".to_owned(),
         (1, points) => {
@@ -417,11 +433,11 @@ fn one_place(found: &Map) -> Option<Caveat> {
         _ => return None,
     };
     let help = "map more places: a larger box, a smaller spacing or more joint values; for a single pose use statics";
-    Some(Caveat::from_message("one-place", "map", message, help))
+    Some(Finding::warning("one-place", "map", message, help))
 }
 
 /// Returns caveats about the worst pose, where the deflections are largest.
-fn validity(robot: &Robot, request: &MapRequest, found: &Map) -> Vec<Caveat> {
+fn validity(robot: &Robot, request: &MapRequest, found: &Map) -> Vec<Finding> {
     let arm = robot.model(&request.modelling);
     let Ok(worst) = arm.and_then(|arm| arm.statics(Some(&found.worst.q), request.wrench)) else {
         return Vec::new();

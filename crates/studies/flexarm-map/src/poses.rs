@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_files::{NumberTable, read_text};
+use flexarm_files::{NumberTable, TextFileError, read_text};
 use flexarm_kinematics::Model;
 use flexarm_settings::{OutOfRange, Quantity};
 use serde::Deserialize;
@@ -14,7 +14,7 @@ use super::region::MAX_PLACES;
 use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
-use flexarm_run::{Caveat, Error, Robot};
+use flexarm_run::{Error, Finding, Robot};
 
 /// A list of poses as written in TOML.
 #[derive(Debug, Deserialize)]
@@ -80,7 +80,10 @@ impl List<'_> {
         let columns = table.names.iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>();
         let columns = columns.map_err(|error| fail(error.to_string()))?;
         let pose = |(row, line): (&Vec<f64>, &usize)| {
-            self.pose(row, &columns).map_err(|error| fail(format!("line {line}: {error}")))
+            self.pose(row, &columns).map_err(|error| {
+                let (path, message) = (path.to_owned(), error.to_string());
+                Error::RobotFile(TextFileError { path, line: *line, column: 1, message, page: "map" })
+            })
         };
         let poses = table.rows.iter().zip(&table.lines).map(pose).collect::<Result<_, _>>()?;
         some(poses).map_err(|error| fail(error.to_string()))
@@ -145,11 +148,12 @@ fn some(poses: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseListError> {
 }
 
 /// Checks the poses and returns them as a region.
-pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region<'m>, Vec<Caveat>), Error> {
+pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region<'m>, Vec<Finding>), Error> {
     let actuated = &model.coordinates()[..model.n_actuated()];
     let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
     if !(1..=MAX_PLACES).contains(&poses.len()) {
-        return Err(MapError::Poses { found: poses.len() }.into());
+        let message = format!("the list has {found} poses, expected one to {MAX_PLACES}", found = poses.len());
+        return Err(MapError::Input(message).into());
     }
     let mut caveats = Vec::new();
     for (k, c) in actuated.iter().enumerate() {
@@ -158,7 +162,7 @@ pub(super) fn region<'m>(poses: &'m [Vec<f64>], model: &Model) -> Result<(Region
         if count > 0 {
             let (lower, upper) = (c.limits.lower, c.limits.upper);
             let message = format!("{count} poses have joint {:?} beyond its limits {lower} to {upper}", c.joint);
-            caveats.push(Caveat::from_message("outside-limits", &c.joint, message, "check the units of the list"));
+            caveats.push(Finding::warning("outside-limits", &c.joint, message, "check the units of the list"));
         }
     }
     for pose in poses {

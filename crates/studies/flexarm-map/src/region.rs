@@ -1,6 +1,7 @@
 //! Region of a map: TCP positions on a grid, joint positions, or a motion; and the tool directions.
 
 use flexarm_kinematics::Pose;
+use flexarm_settings::Setting;
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, Vector3};
 
 use super::MapError;
@@ -78,17 +79,30 @@ impl ToolDirections {
     /// Returns the rotations of the tool in the world: tilts, and for each of them the rolls.
     ///
     /// # Errors
-    /// [`MapError::ToolAxis`] for an axis without a direction, [`MapError::Cone`] for an invalid
+    /// [`MapError::Input`] for an axis without a direction, and for an invalid
     /// cone or more than 10,000 directions.
     pub fn rotations(&self) -> Result<Vec<Rotation3<f64>>, MapError> {
         let axis = Unit::try_new(Vector3::from(self.axis), 1e-12).filter(|axis| axis.iter().all(|x| x.is_finite()));
-        let axis = axis.ok_or(MapError::ToolAxis { found: self.axis })?;
-        let cone = self.cone_rad;
+        let axis = axis.ok_or_else(|| {
+            MapError::Input(format!(
+                "the tool axis ({}) must be finite and non-zero, found {found:?}",
+                Setting::ToolAxis,
+                found = self.axis
+            ))
+        })?;
+        let (cone, tilts, rolls) = (self.cone_rad, self.tilts, self.rolls);
+        let refused = || {
+            MapError::Input(format!(
+                "the cone of tool directions must have a half angle from 0 to 180 degrees, at least one tilt and one \
+                 roll, and at most 10000 directions, found {:.4} degrees, {tilts} tilts, {rolls} rolls",
+                cone.to_degrees()
+            ))
+        };
         if !(0.0..=std::f64::consts::PI).contains(&cone) || self.tilts == 0 || self.rolls == 0 {
-            return Err(MapError::Cone { half_angle_rad: cone, tilts: self.tilts, rolls: self.rolls });
+            return Err(refused());
         }
         if !self.roll_rad.is_finite() || self.tilts.saturating_mul(self.rolls) > 10_000 {
-            return Err(MapError::Cone { half_angle_rad: cone, tilts: self.tilts, rolls: self.rolls });
+            return Err(refused());
         }
         let straight = upright(&axis);
         let mut rotations = Vec::new();
@@ -152,22 +166,28 @@ impl Grid {
     /// Returns the grid centred in a box.
     ///
     /// # Errors
-    /// [`MapError::Bounds`], [`MapError::Spacing`] or [`MapError::TooMany`] for an invalid box, an
+    /// [`MapError::Input`] for an invalid box, an
     /// invalid spacing or too many places.
     #[doc(hidden)]
     pub fn within([lower, upper]: [[f64; 3]; 2], spacing_m: f64) -> Result<Self, MapError> {
         let sound = (0..3).all(|c| lower[c].is_finite() && upper[c].is_finite() && lower[c] <= upper[c]);
         if !sound {
-            return Err(MapError::Bounds { lower, upper });
+            return Err(MapError::Input(format!(
+                "the box ({}) must have its lower corner first, found {lower:?} to {upper:?} m",
+                Setting::Bounds
+            )));
         }
         if !(spacing_m.is_finite() && spacing_m > 0.0) {
-            return Err(MapError::Spacing { found: spacing_m });
+            return Err(MapError::Input(format!(
+                "the grid spacing ({}) must be positive, found {spacing_m} m",
+                Setting::GridSpacing
+            )));
         }
         // An edge that is a multiple of the spacing includes both its ends.
         let steps = [0, 1, 2].map(|c| ((upper[c] - lower[c]) / spacing_m + 1e-9).floor());
         let places = steps.iter().map(|n| n + 1.0).product::<f64>();
         if places > MAX_PLACES as f64 {
-            return Err(MapError::TooMany { places, most: MAX_PLACES });
+            return Err(MapError::too_many(places));
         }
         let first = |c: usize| lower[c] + 0.5 * (upper[c] - lower[c] - steps[c] * spacing_m).max(0.0);
         Ok(Self { lower: [first(0), first(1), first(2)], spacing_m, count: steps.map(|n| n as usize + 1) })

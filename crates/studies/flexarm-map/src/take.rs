@@ -6,6 +6,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::atomic::{AtomicBool, AtomicUsize};
 
 use flexarm_kinematics::Pose;
+use flexarm_settings::Setting;
 use nalgebra::Rotation3;
 use rayon::prelude::*;
 
@@ -89,7 +90,7 @@ pub(super) struct Choice<'a> {
 /// number of threads.
 ///
 /// # Errors
-/// [`MapError::TooManyRows`] if the rows do not fit in memory.
+/// [`MapError::Input`] if the rows do not fit in memory.
 pub(super) fn take(
     places: &Places<'_>,
     evaluator: &Evaluator<'_>,
@@ -127,7 +128,12 @@ pub(super) fn take(
             return Ok(taken);
         }
         if taken.rows.len() / choice.layout.width() > MAX_PLACES {
-            return Err(MapError::TooManyRows { most: MAX_PLACES });
+            let message = format!(
+                "the map has more than {MAX_PLACES:.0e} poses, the maximum held in memory: keep only the best pose \
+                 of each place, or increase {}",
+                Setting::GridSpacing
+            );
+            return Err(MapError::Input(message));
         }
     }
     if let Ok(go_on) = go_on.into_inner() {

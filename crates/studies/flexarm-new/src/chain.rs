@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 
 use flexarm_kinematics::{Joint, JointKind, Mechanism};
-use flexarm_urdf::closest;
+use flexarm_settings::{Setting, closest};
 
 use super::{NewError, NewOptions};
 
@@ -113,22 +113,32 @@ impl<'a> Tree<'a> {
     }
 }
 
+/// Error about a robot without a joint that has its own coordinate and a range to move in.
+fn no_movable_joint(mechanism: &Mechanism) -> NewError {
+    let robot = &mechanism.name;
+    let why = match mechanism.joints.len() {
+        0 => "it has no joints at all".to_owned(),
+        1 => "its only joint is fixed, a mimic joint or without range".to_owned(),
+        n => format!("all of its {n} joints are fixed, mimic joints or without range"),
+    };
+    NewError(format!(
+        "robot {robot:?} has no joint that moves: {why}; an arm needs at least one joint of type revolute, \
+         continuous or prismatic whose lower limit is below its upper one"
+    ))
+}
+
 /// Returns the requested chain, or else the longest one that is an arm.
 pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewError> {
     let tree = Tree::new(mechanism);
     if !mechanism.joints.iter().any(is_free) {
-        return Err(NewError::NoMovableJoint { robot: mechanism.name.clone(), fixed: mechanism.joints.len() });
+        return Err(no_movable_joint(mechanism));
     }
     let root = tree.root().unwrap_or_default().to_owned();
     let known = |link: &String| {
         let links = || mechanism.links.iter().map(|l| l.name.as_str());
         match mechanism.link(link) {
             Some(_) => Ok(link.clone()),
-            None => Err(NewError::NoLink {
-                link: link.clone(),
-                closest: closest(link, links()),
-                known: links().map(str::to_owned).collect(),
-            }),
+            None => Err(NewError(format!("the robot has no link {link:?}; {}", did_you_mean(link, "links", links())))),
         }
     };
     let base = options.base.as_ref().map(known).transpose()?.unwrap_or(root);
@@ -141,7 +151,11 @@ pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewErr
     let path: Vec<usize> = match whole.iter().position(|&k| tree.joint(k).parent == base) {
         Some(first) => whole[first..].to_vec(),
         None if tool == base => Vec::new(),
-        None => return Err(NewError::NotBelow { base, tool }),
+        None => {
+            return Err(NewError(format!(
+                "the tool {tool:?} is not connected to the base {base:?} by a chain of joints"
+            )));
+        }
     };
     let on_path: Vec<usize> = path.iter().copied().filter(|&k| is_free(tree.joint(k))).collect();
     let joints = match &options.joints {
@@ -149,7 +163,12 @@ pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewErr
         None => on_path,
     };
     if joints.is_empty() {
-        return Err(NewError::NothingMoves { base, tool });
+        let message = format!(
+            "no joint moves between base {base:?} and tool {tool:?}; choose others with {} and {}",
+            Setting::Base,
+            Setting::Tool
+        );
+        return Err(NewError(message));
     }
     let reason = |k: usize| {
         if path.contains(&k) {
@@ -166,14 +185,20 @@ pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewErr
     Ok(Chain { held: others.map(|k| (k, reason(k))).collect(), base, tool, path, joints, choices })
 }
 
+fn did_you_mean<'n>(found: &str, what: &str, known: impl Iterator<Item = &'n str> + Clone) -> String {
+    match closest(found, known.clone()) {
+        Some(name) => format!("did you mean {name:?}?"),
+        None => format!("its {what} are {:?}", known.collect::<Vec<_>>()),
+    }
+}
+
 fn named_joints(mechanism: &Mechanism, names: &[String]) -> Result<Vec<usize>, NewError> {
     let free = || mechanism.joints.iter().filter(|j| is_free(j)).map(|j| j.name.as_str());
     let place = |name: &String| {
         let found = mechanism.joints.iter().position(|j| j.name == *name && is_free(j));
-        found.ok_or_else(|| NewError::NoJoint {
-            joint: name.clone(),
-            closest: closest(name, free()),
-            known: free().map(str::to_owned).collect(),
+        found.ok_or_else(|| {
+            let remedy = did_you_mean(name, "joints", free());
+            NewError(format!("the robot has no joint {name:?} that moves independently; {remedy}"))
         })
     };
     let mut joints = names.iter().map(place).collect::<Result<Vec<_>, _>>()?;
@@ -236,7 +261,12 @@ fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result
         let rank = |c: &Candidate<'_>| (c.is_arm, c.joints, c.named);
         rank(a).cmp(&rank(b)).then((1e3 * a.length).round().total_cmp(&(1e3 * b.length).round()))
     });
-    let Some(best) = best else { return Err(NewError::NothingBelow { base: base.to_owned() }) };
+    let Some(best) = best else {
+        return Err(NewError(format!(
+            "there is no movable joint after the base {base:?}; choose another base with {}",
+            Setting::Base
+        )));
+    };
     let equals: Vec<String> = candidates
         .iter()
         .filter(|c| c.end != best.end && c.is_arm && c.joints == best.joints && c.joints > 1)

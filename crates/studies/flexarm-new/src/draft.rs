@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use flexarm_kinematics::{Data, Joint, Link, Mechanism, Model, forward_kinematics};
+use flexarm_settings::Setting;
 use flexarm_urdf::{Geometry, ReadOptions, TriangleMesh, UrdfError, UrdfRobot, Visual, read_urdf};
 use nalgebra::{DVector, Vector3};
 
@@ -72,7 +73,7 @@ pub(crate) struct Draft {
 impl Draft {
     pub(crate) fn of(path: &Path, options: &NewOptions) -> Result<Self, Error> {
         if let Some(found) = options.payload_kg.filter(|kg| !(kg.is_finite() && *kg >= 0.0)) {
-            return Err(NewError::Payload { found }.into());
+            return Err(NewError(format!("{} is {found}: expected a mass in kg, 0 for none", Setting::Payload)).into());
         }
         let Description { urdf, waived, discarded } = Description::read(path, &options.urdf)?;
         let mechanism = &urdf.mechanism;
@@ -86,7 +87,14 @@ impl Draft {
         let moving_mass = mass_after(mechanism, &chain);
         if moving_mass <= 0.0 {
             let links = mechanism.links.iter().filter(|l| l.inertia.is_none_or(|i| i.mass <= 0.0)).count();
-            return Err(NewError::NoMass { links }.into());
+            let message = format!(
+                "no link of the arm has a mass in this file ({links} links without <inertial>): without mass there \
+                 are no loads and no deflections. Give the mass of the arm from its data sheet with {} KG: it is \
+                 distributed over the links by the volume of their meshes; or a density with {} KG_PER_M3",
+                Setting::InertiaFromTotalMass,
+                Setting::InertiaFromDensity
+            );
+            return Err(NewError(message).into());
         }
         let held = held_joints(mechanism, &chain);
         let ranges = ranges(&bare, mechanism, &chain, &held);
@@ -160,15 +168,10 @@ fn read(path: &Path, options: &ReadOptions) -> Result<(UrdfRobot, Vec<String>), 
         Ok(urdf) => return Ok((urdf, Vec::new())),
         Err(error) => error,
     };
-    let UrdfError::Invalid { issues } = &error else { return Err(error.into()) };
-    let waived: Option<Vec<String>> = issues
-        .iter()
-        .map(|issue| match &issue.problem {
-            flexarm_urdf::Problem::TriangleInequality { link, .. } => Some(link.clone()),
-            _ => None,
-        })
-        .collect();
-    let Some(waived) = waived else { return Err(error.into()) };
+    let waived = match &error {
+        UrdfError::Invalid { issues, waivable } if issues.len() == waivable.len() => waivable.clone(),
+        _ => return Err(error.into()),
+    };
     let mut again = options.clone();
     again.waive.extend(waived.iter().cloned());
     Ok((read_urdf(path, &again)?, waived))

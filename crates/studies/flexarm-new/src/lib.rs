@@ -72,101 +72,10 @@ pub struct NewOptions {
     pub urdf: ReadOptions,
 }
 
-/// An error of making a robot file.
+/// An error of making a robot file: what was found, what was expected and the remedy.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum NewError {
-    /// A file of another format.
-    #[error("{path}: this is {what}, a URDF or xacro file is required; {help}")]
-    OtherFormat {
-        /// Path of the file.
-        path: String,
-        /// Description of the format.
-        what: &'static str,
-        /// Suggested remedy.
-        help: String,
-    },
-    /// No joint with its own coordinate and a range to move in.
-    #[error(
-        "robot {robot:?} has no joint that moves: {}; an arm needs at least one joint of type revolute, continuous or prismatic \
-         whose lower limit is below its upper one",
-        match *fixed {
-            0 => "it has no joints at all".to_owned(),
-            1 => "its only joint is fixed, a mimic joint or without range".to_owned(),
-            _ => format!("all of its {fixed} joints are fixed, mimic joints or without range"),
-        }
-    )]
-    NoMovableJoint {
-        /// Name of the robot.
-        robot: String,
-        /// Number of joints.
-        fixed: usize,
-    },
-    /// No joint moves between base and tool.
-    #[error(
-        "no joint moves between base {base:?} and tool {tool:?}; choose others with {} and {}",
-        Setting::Base,
-        Setting::Tool
-    )]
-    NothingMoves {
-        /// Base link.
-        base: String,
-        /// Tool link.
-        tool: String,
-    },
-    /// No joint moves below the base.
-    #[error("there is no movable joint after the base {base:?}; choose another base with {}", Setting::Base)]
-    NothingBelow {
-        /// Base link.
-        base: String,
-    },
-    /// The tool is not below the base.
-    #[error("the tool {tool:?} is not connected to the base {base:?} by a chain of joints")]
-    NotBelow {
-        /// Base link.
-        base: String,
-        /// Tool link.
-        tool: String,
-    },
-    /// An unknown link.
-    #[error("the robot has no link {link:?}; {}", did_you_mean(closest, "links", known))]
-    NoLink {
-        /// Name requested.
-        link: String,
-        /// Closest name.
-        closest: Option<String>,
-        /// All names.
-        known: Vec<String>,
-    },
-    /// A joint that does not exist or does not move independently.
-    #[error("the robot has no joint {joint:?} that moves independently; {}", did_you_mean(closest, "joints", known))]
-    NoJoint {
-        /// Name requested.
-        joint: String,
-        /// Closest name.
-        closest: Option<String>,
-        /// All names.
-        known: Vec<String>,
-    },
-    /// No moving link has a mass.
-    #[error(
-        "no link of the arm has a mass in this file ({links} links without <inertial>): without mass there are no \
-         loads and no deflections. Give the mass of the arm from its data sheet with {} KG: it is distributed over \
-         the links by the volume of their meshes; or a density with {} KG_PER_M3",
-        Setting::InertiaFromTotalMass,
-        Setting::InertiaFromDensity
-    )]
-    NoMass {
-        /// Number of links without mass.
-        links: usize,
-    },
-    /// A payload that is not a mass.
-    #[error("{} is {found}: expected a mass in kg, 0 for none", Setting::Payload)]
-    Payload {
-        /// Value found.
-        found: f64,
-    },
-}
+#[error("{0}")]
+pub struct NewError(String);
 
 impl From<NewError> for flexarm_run::Error {
     fn from(error: NewError) -> Self {
@@ -175,13 +84,6 @@ impl From<NewError> for flexarm_run::Error {
 }
 
 impl ExternalError for NewError {}
-
-fn did_you_mean(closest: &Option<String>, what: &str, known: &[String]) -> String {
-    match closest {
-        Some(name) => format!("did you mean {name:?}?"),
-        None => format!("its {what} are {known:?}"),
-    }
-}
 
 /// Writes a folder with `robot.toml`, `motion.toml`, `README.md` and, if it is not in the same
 /// place, a copy of the description; then loads and checks the written files.

@@ -27,11 +27,11 @@ pub(crate) struct Placed {
 /// Rejects files that are robots in other formats, or no robots.
 ///
 /// # Errors
-/// [`NewError::OtherFormat`], or [`Error::File`] for a file that is missing or cannot be read.
+/// [`NewError`] for another format, or [`Error::File`] for a file that is missing or cannot be read.
 pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
-    let is = |what, help: &str| {
-        let help = help.to_owned();
-        Err(NewError::OtherFormat { path: path.display().to_string(), what, help }.into())
+    let is = |what: &str, help: &str| {
+        let path = path.display();
+        Err(NewError(format!("{path}: this is {what}, a URDF or xacro file is required; {help}")).into())
     };
     if path.is_dir() {
         let mut found: Vec<String> = std::fs::read_dir(path)

@@ -138,7 +138,7 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
         );
         list.push(assumption("masses", text, &mend));
     }
-    let missing = draft.urdf.warnings.iter().filter(|w| matches!(w.code, "missing-inertial" | "zero-mass"));
+    let missing = draft.urdf.warnings.iter().filter(|w| matches!(&*w.code, "missing-inertial" | "zero-mass"));
     for finding in missing {
         list.push(assumption(
             "masses",

@@ -103,7 +103,7 @@ fn masses(t: &mut String, draft: &Draft) -> std::fmt::Result {
             writeln!(t, "inertia_from_density = {density:?}")?;
         }
         None => {
-            if draft.urdf.warnings.iter().any(|w| matches!(w.code, "missing-inertial" | "zero-mass")) {
+            if draft.urdf.warnings.iter().any(|w| matches!(&*w.code, "missing-inertial" | "zero-mass")) {
                 writeln!(t, "\n# Some moving links have no mass in the description. To give them one:")?;
                 writeln!(t, "# inertia_from_total_mass =     # kg, total of these links")?;
             }

@@ -1,8 +1,8 @@
 //! The arm within a robot.
 
 use flexarm_kinematics::{Joint, JointKind, Link, Mechanism, Mimic, Pose};
+use flexarm_new::NewOptions;
 use flexarm_new::internals::{Chain, find};
-use flexarm_new::{NewError, NewOptions};
 use nalgebra::{Translation3, Vector3};
 
 /// Joints as (parent, child, moves, offset along x).
@@ -60,7 +60,8 @@ fn of_two_arms_the_first_is_taken_and_the_other_told_and_legs_are_no_arms() {
     let from = NewOptions { base: Some("r1".into()), ..right.clone() };
     assert_eq!(names(&mechanism, &find(&mechanism, &from).unwrap()), ["r2"]);
     let wrong = NewOptions { base: Some("l1".into()), ..right };
-    assert!(matches!(find(&mechanism, &wrong), Err(NewError::NotBelow { .. })));
+    let error = find(&mechanism, &wrong).unwrap_err().to_string();
+    assert!(error.contains("is not connected to the base"), "{error}");
 }
 
 #[test]
@@ -71,5 +72,6 @@ fn followers_and_joints_without_room_move_nothing_by_themselves() {
     let chain = find(&mechanism, &NewOptions::default()).unwrap();
     assert_eq!(names(&mechanism, &chain), ["a"]);
     mechanism.joints.iter_mut().for_each(|j| j.kind = JointKind::Fixed);
-    assert!(matches!(find(&mechanism, &NewOptions::default()), Err(NewError::NoMovableJoint { .. })));
+    let error = find(&mechanism, &NewOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("has no joint that moves"), "{error}");
 }

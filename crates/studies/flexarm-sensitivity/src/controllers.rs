@@ -6,7 +6,7 @@ use flexarm_stepping::{Plant, ServoAxis, TorqueLimited};
 
 use super::slopes::{OfAxis, OfFriction};
 use super::{NamedParameter, RunParameter, RunSlopes};
-use flexarm_run::{Arm, Caveat, Error, Scenario};
+use flexarm_run::{Arm, Error, Finding, Scenario};
 
 /// Adds friction and gains of servo-controlled joints.
 pub(super) fn add_controllers(arm: &Arc<Arm>, scenario: &Scenario, all: &mut Vec<NamedParameter>) -> Result<(), Error> {
@@ -25,7 +25,7 @@ pub(super) fn add_controllers(arm: &Arc<Arm>, scenario: &Scenario, all: &mut Vec
 }
 
 /// Returns caveats about servos that reached their limits in a differentiated run.
-pub(super) fn limited(arm: &Arc<Arm>, found: &RunSlopes) -> Vec<Caveat> {
+pub(super) fn limited(arm: &Arc<Arm>, found: &RunSlopes) -> Vec<Finding> {
     let joints: Vec<&str> = arm.joints().collect();
     let caveat = |own: &TorqueLimited| {
         let joint = joints[own.coordinate];
@@ -35,12 +35,7 @@ pub(super) fn limited(arm: &Arc<Arm>, found: &RunSlopes) -> Vec<Caveat> {
              jumps",
             own.samples, own.first_s
         );
-        Caveat::from_message(
-            "servo-limit",
-            format!("joint {joint:?}"),
-            text,
-            "slow the motion down where it is fastest",
-        )
+        Finding::warning("servo-limit", format!("joint {joint:?}"), text, "slow the motion down where it is fastest")
     };
     found.limited.iter().map(caveat).collect()
 }

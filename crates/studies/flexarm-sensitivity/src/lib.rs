@@ -36,7 +36,7 @@ use serde::Serialize;
 use flexarm_identify::parameters::{asks_for, fits};
 use flexarm_run::caveat::{Use, once_each, warnings};
 use flexarm_run::prepare::{loaded, runnable};
-use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, RunOptions, Scenario, ValueError};
+use flexarm_run::{Arm, Error, Finding, Modelling, Robot, RunOptions, Scenario};
 
 use controllers::{add_controllers, limited};
 use slopes::Repeated;
@@ -91,7 +91,7 @@ pub struct Sensitivity {
     /// Messages of the caveats.
     pub warnings: Vec<String>,
     /// Caveats.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Effect of a change of one parameter on the error.
@@ -153,7 +153,7 @@ fn slopes_and_caveats(
     options: &RunOptions,
     parameters: &[RunParameter],
     keep_samples: bool,
-) -> Result<(RunSlopes, Vec<Caveat>), Error> {
+) -> Result<(RunSlopes, Vec<Finding>), Error> {
     let StepperKind::GeneralizedAlpha(settings) = options.stepper else {
         let name = options.stepper.name();
         let text = format!("derivatives of a run need the stepper generalised-alpha, found {name}: use the default");
@@ -161,7 +161,7 @@ fn slopes_and_caveats(
     };
     runnable(&scenario.motion, options)?;
     if arm.springs.is_empty() && !arm.has_servo() {
-        return Err(ValueError::NothingYields.into());
+        return Err(Error::nothing_yields());
     }
     flexarm_run::loops::along_motion(&arm.rigid, &scenario.motion.trajectory)?;
     let unloaded = arm.plant(scenario.motion.prescribed()).map_err(|error| arm.explained(error))?;
@@ -272,7 +272,12 @@ fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) ->
     for pattern in patterns {
         if !all.iter().any(|own| fits(pattern, name(own))) {
             let names = all.iter().map(|own| name(own).to_owned()).collect();
-            return Err(ValueError::NoParameter { pattern: pattern.clone(), names }.into());
+            let message = format!(
+                "no parameter is called {pattern:?}: expected some of {}, * for anything; an entry of a lumped \
+                 link's 6x6 is link.LINK.stiffness[i][j], i and j from 0 to 5",
+                names.join(", ")
+            );
+            return Err(Error::Value(message));
         }
     }
     all.retain(|own| patterns.is_empty() || patterns.iter().any(|pattern| fits(pattern, name(own))));

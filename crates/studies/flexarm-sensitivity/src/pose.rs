@@ -10,7 +10,7 @@ use serde::Serialize;
 use flexarm_identify::Parameter;
 use flexarm_run::caveat::{Use, warnings};
 use flexarm_run::inspect::joint_values;
-use flexarm_run::{Arm, Caveat, Error, Modelling, Robot, ValueError};
+use flexarm_run::{Arm, Error, Finding, Modelling, Robot};
 
 use super::{change_of, chosen, numbers};
 
@@ -32,7 +32,7 @@ pub struct PoseSensitivity {
     /// Messages of the caveats.
     pub warnings: Vec<String>,
     /// Caveats.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Effect of a change of one parameter.
@@ -74,7 +74,7 @@ pub fn pose_sensitivity(
 ) -> Result<PoseSensitivity, Error> {
     let arm = robot.model(&modelling)?;
     if arm.springs.is_empty() {
-        return Err(ValueError::NothingYields.into());
+        return Err(Error::nothing_yields());
     }
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let names: Vec<&str> = joints.iter().map(String::as_str).collect();

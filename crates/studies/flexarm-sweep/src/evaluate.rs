@@ -16,7 +16,7 @@ use super::run_caveats::{CaveatText, stored_caveats};
 use super::value::ParameterValue;
 use super::workshop::PreparedRun;
 use flexarm_run::run::{BeforeRun, static_sag, steps_per_sample};
-use flexarm_run::{Caveat, Error, Keep, RunOptions, RunRequest};
+use flexarm_run::{Error, Finding, Keep, RunOptions, RunRequest};
 
 /// Result of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,7 +109,7 @@ impl Sweep {
         &self,
         values: &[ParameterValue],
         stop: &AtomicBool,
-        caveats: &mut Vec<Caveat>,
+        caveats: &mut Vec<Finding>,
     ) -> Result<SummaryFacts, Error> {
         let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(built.arm.robot_caveats());
@@ -124,7 +124,7 @@ impl Sweep {
 
     /// Computes a run without a full summary. `caveats` receives the caveats known before its first
     /// step, also if it fails.
-    fn quickly(&self, values: &[ParameterValue], caveats: &mut Vec<Caveat>) -> Result<QuickFacts, Error> {
+    fn quickly(&self, values: &[ParameterValue], caveats: &mut Vec<Finding>) -> Result<QuickFacts, Error> {
         let PreparedRun { built, scenario, options } = self.workshop.ready(values)?;
         caveats.extend_from_slice(built.arm.robot_caveats());
         let arm = &*built.arm;

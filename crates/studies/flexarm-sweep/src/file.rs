@@ -460,7 +460,10 @@ fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEnt
     }
     let column = |(k, name): (usize, &String)| {
         let value = |(row, line): (&Vec<f64>, &usize)| match row[k].is_nan() {
-            true => Err(fail(format!("line {line}, column {name:?}: the cell is empty, expected a number"))),
+            true => {
+                let message = format!("column {name:?}: the cell is empty, expected a number");
+                Err(RobotFileError { path: path.to_owned(), line: *line, column: 1, message, page: "sweep" }.into())
+            }
             false => Ok(ParameterValue::Number(row[k])),
         };
         let levels = table.rows.iter().zip(&table.lines).map(value).collect::<Result<Vec<_>, Error>>()?;

@@ -7,17 +7,17 @@ use serde::Serialize;
 
 use super::evaluate::Answer;
 use flexarm_run::caveat::once_each;
-use flexarm_run::{Caveat, Severity};
+use flexarm_run::{Finding, Severity};
 
 /// Caveats of a run as JSON; `None` if there are none. Runs with equal caveats share one text.
 pub(super) type CaveatText = Option<Arc<str>>;
 
-/// Caveat with the runs it concerns, represented by the worst of them.
+/// Finding with the runs it concerns, represented by the worst of them.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CaveatFigures {
-    /// Caveat with the worst value.
+    /// Finding with the worst value.
     #[serde(flatten)]
-    pub caveat: Caveat,
+    pub caveat: Finding,
     /// Number of runs with this caveat.
     pub runs: usize,
     /// Number of the run with the worst value.
@@ -25,18 +25,19 @@ pub struct CaveatFigures {
 }
 
 /// Serialises the caveats of a run; `plain` removes parts of a text that depend on the machine.
-pub fn stored_caveats(caveats: Vec<Caveat>, plain: &dyn Fn(String) -> String) -> CaveatText {
+pub fn stored_caveats(caveats: Vec<Finding>, plain: &dyn Fn(String) -> String) -> CaveatText {
     if caveats.is_empty() {
         return None;
     }
-    let plain = |caveat: Caveat| Caveat { location: plain(caveat.location), message: plain(caveat.message), ..caveat };
-    let caveats: Vec<Caveat> = once_each(caveats).into_iter().map(plain).collect();
+    let plain =
+        |caveat: Finding| Finding { location: plain(caveat.location), message: plain(caveat.message), ..caveat };
+    let caveats: Vec<Finding> = once_each(caveats).into_iter().map(plain).collect();
     serde_json::to_string(&caveats).ok().map(Arc::from)
 }
 
 /// Merges the caveats of all runs, warnings first.
 pub fn figures<'a>(answers: impl Iterator<Item = &'a Answer>) -> Vec<CaveatFigures> {
-    let mut read: HashMap<&str, Vec<Caveat>> = HashMap::new();
+    let mut read: HashMap<&str, Vec<Finding>> = HashMap::new();
     let mut found: BTreeMap<(String, String, String), CaveatFigures> = BTreeMap::new();
     for answer in answers {
         let Some(text) = &answer.stored else { continue };
@@ -62,7 +63,7 @@ pub fn figures<'a>(answers: impl Iterator<Item = &'a Answer>) -> Vec<CaveatFigur
 
 /// Returns the key of caveats to merge: kind and location, and for caveats without a value also the
 /// message without its digits.
-fn key(caveat: &Caveat) -> (String, String, String) {
+fn key(caveat: &Finding) -> (String, String, String) {
     let words = match caveat.value {
         Some(_) => String::new(),
         None => caveat.message.chars().filter(|c| !c.is_ascii_digit()).collect(),
@@ -72,7 +73,7 @@ fn key(caveat: &Caveat) -> (String, String, String) {
 
 /// Returns the severity of a caveat's value among others of its kind: its distance from the
 /// yardstick.
-fn badness(caveat: &Caveat) -> f64 {
+fn badness(caveat: &Finding) -> f64 {
     let (Some(value), Some(yardstick)) = (caveat.value, caveat.yardstick) else { return 0.0 };
     match caveat.code.as_str() {
         // These yardsticks are not limits: the reach of the arm, critical damping, the frequency

@@ -1,14 +1,15 @@
 //! Caveats of many runs, said once.
 
-use flexarm_run::Caveat;
-use flexarm_run::caveat::CaveatKind;
+use flexarm_run::Finding;
+use flexarm_run::caveat::FindingKind;
 use flexarm_sweep::internals::{Answer, figures, stored_caveats, warnings};
 
-const EFFORT: CaveatKind = CaveatKind::warning("effort", "{where} needs {value}, its limit is {yardstick}", "N m", "");
-const SLOW_MODE: CaveatKind = CaveatKind::warning("first-frequency", "{where}: {value}, {yardstick}", "Hz", "");
-const SAG: CaveatKind = CaveatKind::warning("sag", "{where} sags by {value}, {yardstick}", "m", "");
+const EFFORT: FindingKind =
+    FindingKind::warning("effort", "{where} needs {value}, its limit is {yardstick}", "N m", "");
+const SLOW_MODE: FindingKind = FindingKind::warning("first-frequency", "{where}: {value}, {yardstick}", "Hz", "");
+const SAG: FindingKind = FindingKind::warning("sag", "{where} sags by {value}, {yardstick}", "m", "");
 
-fn answer(run: usize, caveats: Vec<Caveat>) -> Answer {
+fn answer(run: usize, caveats: Vec<Finding>) -> Answer {
     Answer { run, result: Ok(Vec::new()), stored: stored_caveats(caveats, &|text| text.replace("/home/me/", "")) }
 }
 
@@ -17,7 +18,7 @@ fn a_caveat_of_many_runs_is_said_once_with_its_worst_value_and_how_often() {
     let effort = |x: f64| EFFORT.found("joint 2", x, 100.0);
     let slow = |hz: f64| SLOW_MODE.found("the arm", hz, 3.0).as_note();
     let file =
-        |n: u32| Caveat::from_message("trajectory", "/home/me/a.csv", format!("/home/me/a.csv: {n} rows repeat"), "");
+        |n: u32| Finding::warning("trajectory", "/home/me/a.csv", format!("/home/me/a.csv: {n} rows repeat"), "");
     let answers = [
         answer(0, vec![effort(120.0), slow(2.0)]),
         answer(1, vec![effort(150.0), slow(1.0), file(2)]),

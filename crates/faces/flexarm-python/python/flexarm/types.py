@@ -42,7 +42,6 @@ __all__ = [
     "ImportChecks",
     "ImportFiles",
     "ImportInterface",
-    "ImportPart",
     "ImportSummary",
     "IndexFigures",
     "Inspection",
@@ -450,15 +449,15 @@ class EnergyFigures(_EnergyFigures, total=False):
     """Part of the dissipated energy due to gear hysteresis (J)."""
 
 
-class CaveatDict(TypedDict):
-    """Single caveat. SI units."""
+class Finding(TypedDict):
+    """Something found in an input or in a result. SI units.  `Display` gives `where: message`, and the remedy on a line of its own."""
 
-    severity: Literal['warning', 'note']
+    severity: Literal['error', 'warning', 'note']
     """Severity."""
     code: str
     """Short, stable identifier of its kind."""
     where: str
-    """Subject: a link, a joint, the payload, a file."""
+    """Place in a file, as `path:line:column`, or the subject: a link, a joint, the payload, a file."""
     message: str
     """Complete message in one sentence."""
     value: float | None
@@ -562,7 +561,7 @@ class _RunSummary(_RunSummaryWith):
     """Maximum torque or force of each drive (N m or N)."""
     warnings: list[str]
     """Warnings among Summary::caveats, as sentences."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Probable errors in the input, and limits of the result's validity."""
     files: RunFiles
     """Written files."""
@@ -646,7 +645,7 @@ class _StaticsDetails(TypedDict):
     """Written files."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Probable errors in the input, and limits of the result's validity."""
 
 
@@ -713,7 +712,7 @@ class _ModesSummary(TypedDict):
     """Written files."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Probable errors in the input, and limits of the result's validity."""
 
 
@@ -792,7 +791,7 @@ class ResponseSummary(TypedDict):
     """Written files."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Probable errors in the input, and limits of the result's validity."""
 
 
@@ -906,7 +905,7 @@ class MapSummary(TypedDict):
     """Written files."""
     warnings: list[str]
     """Messages of the caveats."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Probable errors of the input, and limits of the result's validity."""
 
 
@@ -1063,7 +1062,7 @@ class Compensation(TypedDict):
     """Page."""
     warnings: list[str]
     """Messages of the caveats."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Caveats."""
 
 
@@ -1115,7 +1114,7 @@ class Sensitivity(TypedDict):
     """File with error and derivatives over time."""
     warnings: list[str]
     """Messages of the caveats."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Caveats."""
 
 
@@ -1157,7 +1156,7 @@ class PoseSensitivity(TypedDict):
     """Sensitivities to the parameters of the robot."""
     warnings: list[str]
     """Messages of the caveats."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Caveats."""
 
 
@@ -1323,7 +1322,7 @@ class Identification(TypedDict):
     held_out: HeldOutFigures | None
     """RMS of cross-validation residuals; null with fewer than two readings."""
     misfit: float | None
-    """Ratio of the scatter to the declared one if chance does not explain it; otherwise null."""
+    """Ratio of the scatter to the declared one, above or below 1, if chance does not explain it; otherwise null."""
     deviations_known: bool
     """Whether the deviations of all readings were given; the others are estimated from the scatter."""
     model_errors: list[ModelError]
@@ -1346,7 +1345,7 @@ class Identification(TypedDict):
     """New robot file."""
     page: str | None
     """Path of the page."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Caveats about the identification and the robot."""
     warnings: list[str]
     """Sentences of the caveats that are warnings."""
@@ -1403,7 +1402,7 @@ class MeasurementPlan(TypedDict):
     """File of measurements to fill in."""
     table: str | None
     """Table to fill in."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Caveats about the robot, as from `check`."""
     warnings: list[str]
     """Sentences of the caveats that are warnings."""
@@ -1498,7 +1497,7 @@ class Lobes(TypedDict):
     """Output files."""
     warnings: list[str]
     """Sentences of the caveats that are warnings."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Caveats about the input and the validity of the result."""
 
 
@@ -1624,14 +1623,14 @@ class ParetoFigures(TypedDict):
 
 
 class CaveatFigures(TypedDict):
-    """Caveat with the runs it concerns, represented by the worst of them."""
+    """Finding with the runs it concerns, represented by the worst of them."""
 
-    severity: Literal['warning', 'note']
+    severity: Literal['error', 'warning', 'note']
     """Severity."""
     code: str
     """Short, stable identifier of its kind."""
     where: str
-    """Subject: a link, a joint, the payload, a file."""
+    """Place in a file, as `path:line:column`, or the subject: a link, a joint, the payload, a file."""
     message: str
     """Complete message in one sentence."""
     value: float | None
@@ -1944,7 +1943,7 @@ class ReduceSummary(TypedDict):
     """Peak memory of the process so far; null where the system does not report it."""
     warnings: list[str]
     """Warnings."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """The same warnings with code, value and reference value."""
     files: ReduceFiles
     """Written files."""
@@ -1964,17 +1963,6 @@ class ImportInterface(_ImportInterfaceFrom):
     """Position of the frame."""
     rpy_rad: list[float]
     """Roll, pitch, yaw of the frame."""
-
-
-class ImportPart(TypedDict):
-    """A rigid part."""
-
-    mass_kg: float
-    """Mass."""
-    com_m: list[float]
-    """Centre of mass."""
-    inertia: list[list[float]]
-    """Inertia about the centre of mass, 3×3 (kg m²)."""
 
 
 class ImportChecks(TypedDict):
@@ -2036,7 +2024,7 @@ class ImportSummary(TypedDict):
     """Inverse of the stiffness."""
     split_m: list[float]
     """Position of the elastic joint between the two parts."""
-    parts: list[ImportPart]
+    parts: list[PartFigures]
     """The two rigid parts, proximal first."""
     frequencies_hz: list[float]
     """Natural frequencies with A held and B free (Hz); empty without a mass matrix or modes."""
@@ -2056,7 +2044,7 @@ class ImportSummary(TypedDict):
     """Peak memory of the process so far; null where the system does not report it."""
     warnings: list[str]
     """Warnings."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """The same warnings with code, value and reference value."""
     files: ImportFiles
     """Written files."""
@@ -2290,7 +2278,7 @@ class _Inspection(TypedDict):
     """Total mass (kg), including payload and base."""
     warnings: list[str]
     """Warnings among the caveats, as sentences."""
-    caveats: list[CaveatDict]
+    caveats: list[Finding]
     """Probable errors in the input."""
 
 
@@ -2305,34 +2293,6 @@ class Inspection(_Inspection, total=False):
     """Balancers at the pose; `gravity_torque` and `bias` include them."""
     loops: list[LoopInfo]
     """Closed loops at the pose; `joints` does not contain their dependent joints."""
-
-
-class _Finding(TypedDict):
-    """What is always there."""
-
-    severity: str
-    """`error`, `warning` or `note`."""
-    code: str
-    """Short, stable name of the kind of finding."""
-    where: str
-    """File and line, or joint or link."""
-    message: str
-    """Message."""
-    help: str
-    """Suggested fix."""
-
-
-class Finding(_Finding, total=False):
-    """A finding."""
-
-    value: float | None
-    """Value that was found, if it is a number."""
-    yardstick: float | None
-    """Threshold or reference for the value."""
-    unit: str
-    """Unit of both."""
-    likely: str
-    """Unit error or other mistake that would explain the value."""
 
 
 class NewJoint(TypedDict):
@@ -2547,3 +2507,7 @@ class NewRobot(TypedDict):
     """Written files."""
     summary: RunSummary | None
     """Summary of the first run, if there was one."""
+
+
+#: A finding with a result: a warning or a note.
+CaveatDict = Finding

@@ -54,7 +54,7 @@ impl Place {
         let options = LoadOptions::default();
         let found = check(&file, None, &options);
         let found = found.iter().filter(|f| f.code != "missing-mesh"); // the copy has no meshes
-        let loud = found.filter(|f| f.severity != "note").map(|f| f.code.clone()).collect();
+        let loud = found.filter(|f| f.severity != flexarm::Severity::Note).map(|f| f.code.clone()).collect();
         let held = Robot::load(&file).and_then(|robot| {
             let motion = Motion::load_for(robot.default_trajectory.as_ref().unwrap(), &*robot.rigid_model()?)?;
             let n = motion.trajectory.joints().len();

@@ -3,13 +3,13 @@
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::chain::Chain;
-use crate::doubt::Doubt;
 use crate::mesh::Mesh;
 use crate::mesh_gate::{ElementQuality, MeshGate, ModeCheck};
 use crate::reduced::ReducedLink;
 use crate::reduction::{Condensation, Superelement, worst};
 use crate::rigid_part::RigidPart;
 use crate::sparse::Modes;
+use flexarm_settings::Finding;
 
 /// Computes the checks of a finished reduction.
 pub(super) fn gate(
@@ -105,7 +105,7 @@ pub fn condensed_body(element: &Superelement) -> RigidPart {
 
 /// Warnings about a size, mass or frequency that is implausible for a robot link, usually wrong
 /// units.
-pub(super) fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<Doubt> {
+pub(super) fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<Finding> {
     let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let first = held.frequencies_hz().first().copied();
     let mut doubts = Vec::new();
@@ -114,7 +114,7 @@ pub(super) fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<D
             let said = format!(
                 "{what} is {value:.3e} {unit}; links of robots lie between {low:.0e} and {high:.0e}: are the units those declared?{slip}"
             );
-            doubts.push(Doubt::found("size", value, if value < low { low } else { high }, said));
+            doubts.push(Finding::warning("size", "", said, "").measured(value, if value < low { low } else { high }));
         }
     };
     let of_length = if (1e-2..=2e1).contains(&(size * 1e-3)) {

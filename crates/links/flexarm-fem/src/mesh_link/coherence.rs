@@ -1,10 +1,10 @@
 //! Whether a mesh holds together: parts, misfits, hinges, cracks, and free interfaces.
 
-use crate::doubt::Doubt;
 use crate::mesh::{Bodies, Mesh, Misfit, Part, coincident, connected_parts, misfits};
 use crate::mesh_link::LinkPlan;
 use crate::mesh_link::error::MeshLinkError;
 use crate::reduction::{Interface, ReductionError};
+use flexarm_settings::Finding;
 
 /// Hint for removing a hinge.
 const JOIN: &str = "connect bodies by whole faces (fragment or Coherence in Gmsh, a tie or merge elsewhere)";
@@ -48,13 +48,13 @@ fn body_of(interface: &Interface, bodies: &Bodies) -> usize {
 }
 
 /// Warnings about cracks and hinges in a mesh that is connected.
-pub(super) fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Doubt> {
-    let mut doubts: Vec<Doubt> = bodies
+pub(super) fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Finding> {
+    let mut doubts: Vec<Finding> = bodies
         .hinges
         .iter()
         .take(3)
         .map(|hinge| format!("{hinge}: they turn against each other there; {JOIN} if they are one part"))
-        .map(|said| Doubt::from_message("hinge", said))
+        .map(|said| Finding::warning("hinge", "", said, ""))
         .collect();
     let found = coincident(mesh, mesh.coincidence());
     if let Some([first, _]) = found.pairs.first() {
@@ -69,7 +69,7 @@ pub(super) fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Doubt> {
             p.y,
             p.z
         );
-        doubts.push(Doubt::found("coincident-nodes", found.pairs.len() as f64, 0.0, said));
+        doubts.push(Finding::warning("coincident-nodes", "", said, "").measured(found.pairs.len() as f64, 0.0));
     }
     doubts
 }

@@ -18,7 +18,6 @@ use nalgebra::DMatrix;
 
 use crate::chain::{Chain, ChainSource};
 use crate::cut::mass_properties;
-use crate::doubt::Doubt;
 use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::gate::GateLimits;
@@ -37,6 +36,7 @@ use crate::sparse::{Modes, ModesWanted};
 use crate::stress::{INERTIA_LOADS, StressFields};
 use checks::{gate, implausible};
 use coherence::{check_connected, check_fit, suspicious, with_cause};
+use flexarm_settings::Finding;
 use split::{attach, split};
 
 pub use checks::condensed_body;
@@ -103,7 +103,7 @@ pub struct MeshReduction {
     /// Stress at the nodes of the surface, if requested.
     pub stress: Option<StressFields>,
     /// Warnings about accepted but suspicious input.
-    pub doubts: Vec<Doubt>,
+    pub doubts: Vec<Finding>,
 }
 
 /// Steps of a reduction, for progress displays.
@@ -194,7 +194,7 @@ pub fn reduce_mesh(
         modal: Some(modal),
         gate: Some(gate),
     }));
-    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Doubt::from_message("gate", said)));
+    doubts.extend(link.warnings(&plan.limits).into_iter().map(|said| Finding::warning("gate", "", said, "")));
     let inertia_solves = [plan.geometric, plan.stress].into_iter().filter(|wanted| *wanted).count() * INERTIA_LOADS;
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + inertia_solves;
     let solver = condensation.figures();
@@ -217,7 +217,7 @@ fn two_part_link(
     plan: &LinkPlan,
     densities: &[f64],
     superelement: &Superelement,
-    doubts: &mut Vec<Doubt>,
+    doubts: &mut Vec<Finding>,
 ) -> Result<ReducedLink, MeshLinkError> {
     let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
     let K12 = stiffness12(superelement).ok_or(loose)?;

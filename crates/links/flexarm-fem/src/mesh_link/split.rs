@@ -5,7 +5,6 @@ use nalgebra::{DMatrix, Matrix6, Vector3};
 
 use crate::chain::{Chain, centre_of_compliance};
 use crate::cut::{CutError, CutPlane, cut};
-use crate::doubt::Doubt;
 use crate::error::FemError;
 use crate::frames::LinkFrames;
 use crate::mesh::Mesh;
@@ -13,6 +12,7 @@ use crate::mesh_link::error::MeshLinkError;
 use crate::reduced::ReducedLink;
 use crate::reduction::spd_inverse;
 use crate::rigid_part::RigidPart;
+use flexarm_settings::Finding;
 
 /// Position of the elastic joint of the two-part link.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -36,7 +36,7 @@ pub(super) fn split(
     frames: LinkFrames,
     K12: &Matrix12,
     at: SplitAt,
-    doubts: &mut Vec<Doubt>,
+    doubts: &mut Vec<Finding>,
 ) -> Result<(LinkFrames, [RigidPart; 2]), MeshLinkError> {
     let normal = frames.p_AB();
     let parts = |point: Vector3<f64>| -> Result<[RigidPart; 2], CutError> {
@@ -47,7 +47,7 @@ pub(super) fn split(
         }
     };
     let (p_LS, said) = split_point(&frames, K12, at, &|p| parts(p).is_ok());
-    doubts.extend(said.map(|said| Doubt::from_message("split", said)));
+    doubts.extend(said.map(|said| Finding::warning("split", "", said, "")));
     let parts = parts(p_LS).map_err(|source| MeshLinkError::Split { p: p_LS.into(), source })?;
     Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }

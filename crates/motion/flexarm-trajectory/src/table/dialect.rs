@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use flexarm_settings::written::csv_fields;
+use flexarm_settings::written::{csv_column, csv_fields};
 
 /// Field separator of a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,6 +35,11 @@ impl Separator {
             Self::Comma => letter == ',',
             Self::Spaces => letter == ' ' || letter == '\t',
         }
+    }
+
+    /// Column of a field in a line, in characters from 1.
+    pub(super) fn column(self, line: &str, field: usize) -> Option<usize> {
+        csv_column(line, |letter| self.is(letter), self == Self::Spaces, field)
     }
 
     /// Splits a line into fields without the surrounding quotes; a quote within quotes is doubled.

@@ -1,5 +1,7 @@
 //! Assignment of the columns of a table to the time and the joints.
 
+use flexarm_settings::Setting;
+
 use std::collections::BTreeSet;
 
 use super::dialect::number;
@@ -8,8 +10,8 @@ use super::lines::{Table, run_joint};
 use super::located::{Located, at, at_field, nowhere};
 use super::request::TableRequest;
 use crate::column_map::ColumnMap;
-use crate::joint_names::{NameError, misspelt};
-use crate::problem::Problem;
+use crate::joint_names::{misspelt, misspelt_text, none_known_text};
+use crate::problem::{Problem, list};
 use crate::trajectory::StatedUnit;
 use crate::warning::Warning;
 
@@ -60,7 +62,18 @@ impl Table<'_> {
     }
 
     fn no_time(&self) -> Located {
-        at(self.header_line, Problem::NoTimeColumn { found: self.names.clone() })
+        at(
+            self.header_line,
+            Problem::new(
+                "no-time-column",
+                format!(
+                    "no column of the header {} is a time (`time`, `t`, `Time[s]`, `timestamp`); rename one, or tell \
+                     which it is: {} t=<column>",
+                    list(&self.names),
+                    Setting::Columns
+                ),
+            ),
+        )
     }
 
     /// Layout given by the user.
@@ -78,7 +91,7 @@ impl Table<'_> {
         for (joint, column) in &map.joints {
             let (place, unit) = self.column(column)?;
             if !taken.insert(place) {
-                let problem = Problem::RepeatedColumn { name: self.shown(place), first: place + 1 };
+                let problem = Problem::repeated_column(&self.shown(place), place + 1);
                 return Err(at_field(self.header_line, place, problem));
             }
             self.add(&mut layout, request, joint, place, unit)?;
@@ -113,11 +126,11 @@ impl Table<'_> {
                 Some(joint) if known(&joint) && (is_own || is_numeric()) => {
                     if let Some(found) = unknown {
                         let accepted = "rad, deg, m, mm, and rates of them";
-                        let problem = Problem::UnknownUnit { key: "column", found, accepted };
+                        let problem = Problem::unknown_unit("column", &found, accepted);
                         return Err(at_field(self.header_line, place, problem));
                     }
                     if let Some(used) = layout.find(&joint, order) {
-                        let problem = Problem::RepeatedColumn { name: joint, first: used.place + 1 };
+                        let problem = Problem::repeated_column(&joint, used.place + 1);
                         return Err(at_field(self.header_line, place, problem));
                     }
                     self.add_order(&mut layout, request, &joint, place, unit, order)?;
@@ -147,20 +160,26 @@ impl Table<'_> {
             let unnamed: Vec<&str> =
                 joints.iter().copied().filter(|joint| layout.find(joint, *order).is_none()).collect();
             if let Some((found, meant)) = misspelt([name.as_str()], &unnamed) {
-                let (found, column) = (found.to_owned(), Some(self.shown(*place)));
-                let problem = Problem::Names(NameError::Misspelt { found, meant, column });
+                let by_column =
+                    format!(", say which column it is ({} {meant}={})", Setting::Columns, self.shown(*place));
+                let problem = Problem::new("misspelt-joint", misspelt_text(found, &meant, &by_column));
                 return Err(at_field(self.header_line, *place, problem));
             }
         }
         if let Some(rate) = layout.used.iter().find(|used| layout.find(&used.joint, 0).is_none()) {
             let (column, joint, found) = (self.shown(rate.place), rate.joint.clone(), self.names.clone());
-            return Err(at_field(self.header_line, rate.place, Problem::NoPositionColumn { column, joint, found }));
+            let message = format!(
+                "column {column:?} has no position column {joint:?} beside it; the header has {}; add it or correct \
+                 the name",
+                list(&found)
+            );
+            return Err(at_field(self.header_line, rate.place, Problem::new("no-position-column", message)));
         }
         if !layout.used.is_empty() {
             return Ok(());
         }
-        let (found, joints) = (self.names.clone(), joints.into_iter().map(str::to_owned).collect());
-        Err(at(self.header_line, Problem::Names(NameError::NoneKnown { found, joints, is_table: true })))
+        let by_column = format!(", or name the columns: {} <joint>=<column>", Setting::Columns);
+        Err(at(self.header_line, Problem::new("no-joint", none_known_text(&self.names, &joints, &by_column))))
     }
 
     /// Joint, order, unit and unknown unit of a column; the joint is `None` if the column is not
@@ -214,8 +233,18 @@ impl Table<'_> {
             [one] => Ok(one),
             [] => Err(self.no_time()),
             _ => {
-                let columns = found.iter().map(|(place, _)| self.names[*place].clone()).collect();
-                Err(at(self.header_line, Problem::SeveralTimes { columns }))
+                let columns: Vec<String> = found.iter().map(|(place, _)| self.names[*place].clone()).collect();
+                Err(at(
+                    self.header_line,
+                    Problem::new(
+                        "several-times",
+                        format!(
+                            "the columns {} are all times; name the one that counts: {} t=<column>,<joint>=<column>",
+                            list(&columns),
+                            Setting::Columns
+                        ),
+                    ),
+                ))
             }
         }
     }
@@ -226,7 +255,13 @@ impl Table<'_> {
         let (bare, stated, unknown) = name_and_unit(asked);
         let missing = || {
             let (asked, found) = (asked.to_owned(), self.names.clone());
-            at(self.header_line, Problem::NoSuchColumn { asked, found })
+            at(
+                self.header_line,
+                Problem::new(
+                    "no-such-column",
+                    format!("there is no column {asked:?}; the header has {}", list(&found)),
+                ),
+            )
         };
         if let Some(digits) = bare.strip_prefix('#') {
             let place: usize = digits.trim().parse().map_err(|_| missing())?;
@@ -238,7 +273,7 @@ impl Table<'_> {
         }
         if let (Some(found), false) = (unknown, self.names.iter().any(|name| name_and_unit(name).0 == bare)) {
             let accepted = "s, ms, us, ns, min, rad, deg, mrad, m, mm";
-            return Err(nowhere(Problem::UnknownUnit { key: "columns", found, accepted }));
+            return Err(nowhere(Problem::unknown_unit("columns", &found, accepted)));
         }
         let matching = |name: &String| *name == bare || name_and_unit(name).0 == bare;
         let places: Vec<usize> = (0..self.names.len()).filter(|place| matching(&self.names[*place])).collect();
@@ -246,8 +281,17 @@ impl Table<'_> {
             [place] => Ok((place, stated.or_else(|| self.unit_of(place)))),
             [] => Err(missing()),
             _ => {
-                let columns = places.iter().map(|place| self.names[*place].clone()).collect();
-                Err(at(self.header_line, Problem::AmbiguousColumn { asked: asked.to_owned(), columns }))
+                let columns: Vec<String> = places.iter().map(|place| self.names[*place].clone()).collect();
+                Err(at(
+                    self.header_line,
+                    Problem::new(
+                        "ambiguous-column",
+                        format!(
+                            "{asked:?} could be each of the columns {}; give the whole name, or its number as in #2",
+                            list(&columns)
+                        ),
+                    ),
+                ))
             }
         }
     }
@@ -267,7 +311,13 @@ impl Table<'_> {
             Measure::Angle => "an angle",
             Measure::Length => "a length",
         };
-        at(self.header_line, Problem::WrongMeasure { column, found, expected })
+        at(
+            self.header_line,
+            Problem::new(
+                "wrong-measure",
+                format!("the column {column:?} has the unit of {found}; expected {expected}"),
+            ),
+        )
     }
 
     fn add(
@@ -311,8 +361,7 @@ impl Table<'_> {
             let stated = self.degrees.filter(|_| unit.measure == Measure::Angle);
             if stated.is_some_and(|(_, degrees)| degrees != (unit.scale != 1.0)) {
                 let (first, second) = if unit.scale == 1.0 { ("deg", "rad") } else { ("rad", "deg") };
-                let (first, second) = (first.to_owned(), second.to_owned());
-                let problem = Problem::ContradictingUnits { key: "unit", first, second };
+                let problem = Problem::contradicting_units(first, second);
                 return Err(at_field(self.header_line, place, problem));
             }
         }

@@ -1,5 +1,7 @@
 //! Header, separator and lines of a table, and the units that its comments state.
 
+use flexarm_settings::Setting;
+
 use super::dialect::{Separator, clock_time, number};
 use super::header::{Measure, Unit, name_and_unit, unit};
 use super::located::{Located, at, nowhere};
@@ -39,7 +41,12 @@ impl<'t> Table<'t> {
         let ends_whole = text.ends_with(['\n', '\r']);
         let lines = || text.split(['\n']).map(|line| line.trim_end_matches('\r')).enumerate().map(|(i, l)| (i + 1, l));
         let mut content = lines().filter(|(_, line)| !line.trim().is_empty() && !is_comment(line));
-        let Some((first_line, first)) = content.next() else { return Err(nowhere(Problem::Empty)) };
+        let Some((first_line, first)) = content.next() else {
+            return Err(nowhere(Problem::new(
+                "empty",
+                "the file is empty; expected a header `time,<joint>,...` and at least two rows",
+            )));
+        };
         let second = content.next();
         // In a file without a header line the last comment before the numbers may be the header, as
         // numpy writes it.
@@ -60,7 +67,14 @@ impl<'t> Table<'t> {
             match named {
                 Some((line, names)) => (separator, line, names, first_line),
                 None if by_number => (separator, first_line, vec![String::new(); width], first_line),
-                None => return Err(at(first_line, Problem::NoHeader { fields: width })),
+                None => {
+                    let message = format!(
+                        "the table has {width} columns of numbers and no header; put one above (`time,<joint>,...`), \
+                         or tell the columns by number: {} t=#1[s],<joint>=#2[rad]",
+                        Setting::Columns
+                    );
+                    return Err(at(first_line, Problem::new("no-header", message)));
+                }
             }
         } else {
             match below_preamble(
@@ -106,27 +120,24 @@ impl<'t> Table<'t> {
                 ("unit", "rad" | "deg") => {
                     let degrees = value == "deg";
                     if self.degrees.is_some_and(|(_, before)| before != degrees) {
-                        let (first, second) = (if degrees { "rad" } else { "deg" }.to_owned(), value.to_owned());
-                        return Err(at(line, Problem::ContradictingUnits { key: "unit", first, second }));
+                        let first = if degrees { "rad" } else { "deg" };
+                        return Err(at(line, Problem::contradicting_units(first, value)));
                     }
                     self.degrees = Some((line, degrees));
                 }
                 ("unit", found) => {
-                    let found = found.to_owned();
-                    return Err(at(line, Problem::UnknownUnit { key: "unit", found, accepted: "rad, deg" }));
+                    return Err(at(line, Problem::unknown_unit("unit", found, "rad, deg")));
                 }
                 ("metres", names) => {
                     self.metres.extend(names.split(',').map(|name| (line, name.trim().to_owned())));
                 }
                 ("cutoff", found) => {
                     let hz = found.strip_suffix("Hz").and_then(|number| number.trim().parse().ok());
-                    let wrong =
-                        || Problem::Value { key: "cutoff".into(), found: found.into(), expected: "Hz, such as 20 Hz" };
-                    self.cutoff = Some((line, hz.ok_or_else(|| at(line, wrong()))?));
+                    let wrong = || at(line, Problem::value("cutoff", found, "Hz, such as 20 Hz"));
+                    self.cutoff = Some((line, hz.ok_or_else(wrong)?));
                 }
                 ("time", found) if found != "s" && unit(found).is_none_or(|unit| unit.measure == Measure::Time) => {
-                    let found = found.to_owned();
-                    return Err(at(line, Problem::UnknownUnit { key: "time", found, accepted: "s" }));
+                    return Err(at(line, Problem::unknown_unit("time", found, "s")));
                 }
                 _ => {}
             }

@@ -37,13 +37,15 @@ mod located;
 pub(crate) mod request;
 mod rows;
 
+use flexarm_settings::Setting;
+
 use self::dialect::Separator;
 use self::header::{Measure, Unit};
 use self::layout::Layout;
 use self::lines::Table;
 use self::located::{Located, at, at_field};
 use self::rows::{Rows, joints};
-use crate::error::{FileError, TrajectoryError};
+use crate::error::TrajectoryError;
 use crate::problem::{Problem, SampleError};
 use crate::spline::{Samples, not_increasing};
 use crate::trajectory::Trajectory;
@@ -81,11 +83,13 @@ impl Trajectory {
         // Line ends of old Macintosh files.
         let with_ends = (text.contains('\r') && !text.contains('\n')).then(|| text.replace('\r', "\n"));
         let text = with_ends.as_deref().unwrap_or(text);
-        let read = Table::find(text, request).and_then(|table| table.read(request));
-        read.map_err(|Located { line, column, problem, more_lines }| {
-            let (origin, problem) = (origin.to_owned(), *problem);
-            Box::new(FileError { origin, line, column, problem, more_lines }).into()
-        })
+        let failed = |Located { line, field, mut problem, more_lines }: Located, separator: Separator| {
+            let place = |(line, field): (usize, usize)| separator.column(text.lines().nth(line - 1)?, field);
+            problem.message += &further(&more_lines);
+            problem.at(origin, line, line.zip(field).and_then(place))
+        };
+        let table = Table::find(text, request).map_err(|error| failed(error, Separator::Comma))?;
+        table.read(request).map_err(|error| failed(error, table.separator))
     }
 
     /// As [`Trajectory::parse_table`], for a table whose header names time and joints.
@@ -94,6 +98,19 @@ impl Trajectory {
     /// As [`Trajectory::parse_table`].
     pub fn parse_csv(text: &str, origin: &str) -> Result<Self, TrajectoryError> {
         Self::parse_table(text, origin, &TableRequest::default()).map(|(trajectory, _)| trajectory)
+    }
+}
+
+/// Text about further lines that are wrong; the first ten are named.
+fn further(lines: &[usize]) -> String {
+    let named: Vec<String> = lines.iter().take(10).map(usize::to_string).collect();
+    match lines.len() {
+        0 => String::new(),
+        1 => format!(" (line {} is wrong, too)", named[0]),
+        count => {
+            let rest = if count > named.len() { ", ..." } else { "" };
+            format!(" ({count} more lines are wrong: {}{rest})", named.join(", "))
+        }
     }
 }
 
@@ -116,7 +133,7 @@ impl Table<'_> {
         let mut samples = Samples { times, joints: joints(&layout, &rows) };
         if let Some((line, hz)) = self.cutoff {
             samples = samples.smoothed(hz).map_err(|error| match error {
-                SampleError::Cutoff { .. } => at(line, Problem::Samples(error)),
+                SampleError::Cutoff { .. } => at(line, error.into()),
                 _ => self.placed(error.into(), &layout, &rows),
             })?;
         }
@@ -154,8 +171,9 @@ impl Table<'_> {
         let Some((line, name)) = self.metres.iter().find(|(_, name)| !is_used(name) && !is_column(name)) else {
             return Ok(());
         };
-        let joints = layout.used.iter().filter(|used| used.order == 0).map(|used| used.joint.clone()).collect();
-        Err(at(*line, Problem::UnknownJoint { key: "metres", name: name.clone(), joints }))
+        let joints: Vec<String> =
+            layout.used.iter().filter(|used| used.order == 0).map(|used| used.joint.clone()).collect();
+        Err(at(*line, Problem::unknown_joint("metres", name, &joints)))
     }
 
     /// Rejects angles too large for radians in a table that does not state its unit.
@@ -164,7 +182,13 @@ impl Table<'_> {
             let largest = values.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
             if used.order == 0 && largest > SUSPICIOUS_ANGLE && layout.assumed.contains(&used.joint) {
                 let (joint, column) = (used.joint.clone(), self.shown(used.place));
-                return Err(at_field(self.header_line, used.place, Problem::UnitNeeded { joint, column, largest }));
+                let message = format!(
+                    "joint {joint:?} reaches {largest:.4} in a table that does not state its unit, too much for \
+                     radians to be assumed; name the unit in the header (`{column}[deg]`), in a line `# unit: deg` \
+                     above it, or with {} {joint}={column}[deg]",
+                    Setting::Columns
+                );
+                return Err(at_field(self.header_line, used.place, Problem::new("unit-needed", message)));
             }
         }
         Ok(())
@@ -195,20 +219,20 @@ impl Table<'_> {
                     let first = rows.times.first().copied().unwrap_or_default();
                     let times: Vec<f64> = rows.times.iter().map(|time| time.since(first)).collect();
                     let more_lines = not_increasing(&times).filter(|k| k != row).map(|row| rows.lines[row]).collect();
-                    Located { more_lines, ..at_field(rows.lines[*row], layout.time, Problem::Samples(error)) }
+                    Located { more_lines, ..at_field(rows.lines[*row], layout.time, error.into()) }
                 }
                 SampleError::AccelerationWithoutVelocity { joint } => match layout.find(joint, 2) {
-                    Some(used) => at_field(self.header_line, used.place, Problem::Samples(error)),
-                    None => at(self.header_line, Problem::Samples(error)),
+                    Some(used) => at_field(self.header_line, used.place, error.into()),
+                    None => at(self.header_line, error.into()),
                 },
-                _ => at(self.header_line, Problem::Samples(error)),
+                _ => at(self.header_line, error.into()),
             },
             TrajectoryError::OutOfRange { joint, time_s } => {
                 let first = rows.times.first().copied().unwrap_or_default();
                 let row = rows.times.iter().position(|t| t.since(first) >= time_s).unwrap_or(0);
-                at(rows.lines.get(row).copied().unwrap_or(self.header_line), Problem::OutOfRange { joint })
+                at(rows.lines.get(row).copied().unwrap_or(self.header_line), Problem::out_of_range(&joint))
             }
-            other => at(self.header_line, Problem::Toml { message: other.to_string() }),
+            other => at(self.header_line, Problem::new("toml", other.to_string())),
         }
     }
 }

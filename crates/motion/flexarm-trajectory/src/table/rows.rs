@@ -89,7 +89,12 @@ impl Table<'_> {
                 continue;
             }
             if rows.times.len() >= MAX_NUMBERS / (layout.used.len() + 1) {
-                return Err(at(line, Problem::TooManyNumbers { most: MAX_NUMBERS }));
+                let message = format!(
+                    "more than {most} numbers, the limit (an hour of six joints at 1 kHz has 25 million); leave out \
+                     rows: splines pass between them",
+                    most = MAX_NUMBERS
+                );
+                return Err(at(line, Problem::new("too-many-numbers", message)));
             }
             rows.lines.push(line);
             rows.times.push(time);
@@ -99,7 +104,11 @@ impl Table<'_> {
             return Err(wrong);
         }
         if let (Some(point), Some(comma)) = (decimals.point, decimals.comma) {
-            return Err(at(point.max(comma), Problem::MixedDecimals { point, comma }));
+            let message = format!(
+                "numbers have decimal points (line {point}) and decimal commas (line {comma}); write all in one way, \
+                 without separators of thousands"
+            );
+            return Err(at(point.max(comma), Problem::new("mixed-decimals", message)));
         }
         rows.comma = decimals.comma.is_some();
         Ok(rows)
@@ -128,16 +137,36 @@ impl Table<'_> {
         let (found, expected) = (fields.len(), self.names.len());
         if found != expected {
             let problem = match self.separator {
-                Separator::Comma if found == 2 * expected => Problem::DecimalCommas { found, expected },
-                _ => Problem::Ragged { found, expected },
+                Separator::Comma if found == 2 * expected => Problem::new(
+                    "decimal-commas",
+                    format!(
+                        "the row has {found} fields, the header {expected}: twice as many, as if numbers had decimal \
+                         commas between commas, which is ambiguous; export the table with semicolons, or with points \
+                         in numbers"
+                    ),
+                ),
+                _ => Problem::new(
+                    "ragged",
+                    format!(
+                        "the row has {found} fields, the header {expected}; was the file cut off? complete or remove \
+                         the row"
+                    ),
+                ),
             };
             return Err(at(line, problem));
         }
         let mut value = |place: usize| -> Result<f64, Located> {
             let field = &fields[place];
             let (value, decimal) = number(field).ok_or_else(|| {
-                let (column, found) = (self.shown(place), field.chars().take(40).collect());
-                at_field(line, place, Problem::NotANumber { column, found })
+                let (column, found) = (self.shown(place), field.chars().take(40).collect::<String>());
+                at_field(
+                    line,
+                    place,
+                    Problem::new(
+                        "not-a-number",
+                        format!("{column}: {found:?} is not a number; expected one such as 0.25 or -1e-3"),
+                    ),
+                )
             })?;
             match decimal {
                 Decimal::None => {}

@@ -5,12 +5,11 @@ use std::fmt::Write as _;
 use flexarm_settings::closest;
 use roxmltree::Node;
 
-use crate::error::Problem;
-use crate::finding::TextPosition;
 use crate::lint::Lint;
 use crate::lint::attribute::Attribute;
 use crate::lint::attribute::Kind::{self, Name};
 use crate::lint::attribute::Missing::{As, Fault, LeftOut};
+use crate::place::TextPosition;
 use crate::xml::{escaped, named};
 
 impl Lint<'_, '_> {
@@ -49,9 +48,7 @@ impl Lint<'_, '_> {
                         found
                     }
                     None => {
-                        let (owner, found, expected) = (owner.to_owned(), found.to_owned(), kind.expected());
-                        let problem = Problem::NotANumber { owner, attribute, found, expected };
-                        self.report.error(&self.lines.of(node), problem);
+                        self.not_a_number(&self.lines.of(node), owner, attribute, found, kind.expected());
                         kind.zero()
                     }
                 },
@@ -94,12 +91,27 @@ impl Lint<'_, '_> {
         }
     }
 
+    /// Reports an attribute that is not a number, or NaN or infinite.
+    pub(super) fn not_a_number(
+        &mut self,
+        place: &TextPosition,
+        owner: &str,
+        attribute: &str,
+        found: &str,
+        expected: &str,
+    ) {
+        let message = format!("{owner}: {attribute}={found:?}, expected {expected}");
+        let help = "write plain decimal numbers such as 0.1 or -1.5e-3, separated by spaces";
+        self.report.error(place, "not-a-number", message, help);
+    }
+
     /// Returns a child element; reports a fault if it is missing.
     pub(super) fn needed<'n, 'i>(&mut self, node: Node<'n, 'i>, element: &'static str) -> Option<Node<'n, 'i>> {
         let child = named(node, element);
         if child.is_none() {
             let owner = self.outer(node);
-            self.report.error(&self.lines.of(node), Problem::MissingElement { owner, element });
+            let message = format!("{owner} has no <{element}>");
+            self.report.error(&self.lines.of(node), "missing-element", message, format!("add <{element} .../>"));
         }
         child
     }
@@ -114,8 +126,8 @@ impl Lint<'_, '_> {
     ) -> Option<&'n str> {
         let value = node.attribute(attribute).filter(|value| !matches!(kind, Name) || !value.trim().is_empty());
         if value.is_none() {
-            let problem = Problem::MissingAttribute { owner: owner.to_owned(), attribute };
-            self.report.error(&self.lines.of(node), problem);
+            let message = format!("{owner} has no attribute {attribute:?}");
+            self.report.error(&self.lines.of(node), "missing-attribute", message, format!("add {attribute}=\"...\""));
         }
         value
     }

@@ -2,7 +2,7 @@
 
 use nalgebra::UnitQuaternion;
 
-use crate::finding::TextPosition;
+use crate::place::TextPosition;
 use crate::transmission::Transmission;
 
 /// Text for `urdf_rs`, and a mark for each of its links and joints, in the same order.

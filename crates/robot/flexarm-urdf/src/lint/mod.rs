@@ -33,9 +33,8 @@ use flexarm_settings::closest;
 use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::Node;
 
-use crate::error::Problem;
-use crate::finding::TextPosition;
-use crate::report::Report;
+use crate::place::TextPosition;
+use crate::report::{Report, did_you_mean};
 use crate::transmission::transmission;
 use crate::xml::{Lines, elements, named};
 use attribute::Attribute;
@@ -87,12 +86,21 @@ pub(crate) const RATES: [&str; 3] = ["acceleration", "deceleration", "jerk"];
 pub fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Option<PlainUrdf> {
     let place = lines.of(root);
     if root.tag_name().name() != "robot" {
-        report.error(&place, Problem::NotUrdf { root: root.tag_name().name().to_owned() });
+        let root = root.tag_name().name();
+        let help = match root {
+            "sdf" => "this is an SDF file; export the robot as URDF",
+            "mujoco" => "this is an MJCF file; export the robot as URDF",
+            "COLLADA" => "this is a mesh; give the URDF that refers to it",
+            _ => "give a URDF file",
+        };
+        report.error(&place, "not-urdf", format!("the root element is <{root}>, expected <robot>"), help);
         return None;
     }
     let found = elements(root).filter(|n| matches!(n.tag_name().name(), "link" | "joint")).count();
     if found > MAX_ELEMENTS {
-        report.error(&place, Problem::TooManyElements { found, most: MAX_ELEMENTS });
+        let message = format!("the robot has {found} links and joints, at most {MAX_ELEMENTS} are read");
+        let help = "is this one robot? Arms have some dozens of links: leave out what does not move with it";
+        report.error(&place, "too-many-elements", message, help);
         return None;
     }
     let version = version(root);
@@ -199,8 +207,8 @@ impl Lint<'_, '_> {
     fn geometry(&mut self, node: Node<'_, '_>) -> bool {
         let Some(geometry) = self.needed(node, "geometry") else { return false };
         let Some(shape) = elements(geometry).next() else {
-            let owner = format!("{}, <geometry>", self.owner);
-            self.report.error(&self.lines.of(geometry), Problem::MissingElement { owner, element: "mesh" });
+            let message = format!("{}, <geometry> has no <mesh>", self.owner);
+            self.report.error(&self.lines.of(geometry), "missing-element", message, "add <mesh .../>");
             return false;
         };
         let kind = shape.tag_name().name();
@@ -262,7 +270,10 @@ impl Lint<'_, '_> {
         let second = elements(node).filter(|n| n.has_tag_name("mimic")).nth(1);
         if let Some(second) = second {
             let count = elements(node).filter(|n| n.has_tag_name("mimic")).count();
-            self.report.error(&self.lines.of(second), Problem::SeveralMimics { joint: name.to_owned(), count });
+            let message = format!("joint {name:?} has {count} <mimic>; a joint follows one other joint");
+            let help =
+                "keep one; a joint that depends on several is driven by a motion of its own or belongs to a [[loop]]";
+            self.report.error(&self.lines.of(second), "several-mimics", message, help);
         }
         let dynamics = [("damping", Numbers(1), LeftOut), ("friction", Numbers(1), LeftOut)];
         self.child(node, "dynamics", false, &dynamics);
@@ -289,8 +300,7 @@ impl Lint<'_, '_> {
             let found = limit.attribute(attribute)?;
             let bound = Bound.numbers(found);
             if bound.is_none() {
-                let (owner, found, expected) = (owner.clone(), found.to_owned(), Bound.expected());
-                self.report.error(&place, Problem::NotANumber { owner, attribute, found, expected });
+                self.not_a_number(&place, &owner, attribute, found, Bound.expected());
             }
             bound?.first().copied()
         });
@@ -302,13 +312,19 @@ impl Lint<'_, '_> {
     fn joint_type<'n>(&mut self, node: Node<'n, '_>, name: &str) -> &'n str {
         let owner = format!("{}, <joint>", self.owner);
         let Some(found) = self.required(node, &owner, "type", Text) else { return "floating" };
-        let joint = name.to_owned();
-        let problem = match found {
-            "fixed" | "revolute" | "continuous" | "prismatic" => return found,
-            kind if JOINT_TYPES.contains(&kind) => Problem::UnsupportedJoint { joint, kind: kind.to_owned() },
-            _ => Problem::UnknownJointType { joint, found: found.to_owned(), closest: closest(found, JOINT_TYPES) },
-        };
-        self.report.error(&self.lines.of(node), problem);
+        let place = self.lines.of(node);
+        if ["fixed", "revolute", "continuous", "prismatic"].contains(&found) {
+            return found;
+        }
+        if JOINT_TYPES.contains(&found) {
+            let message = format!("joint {name:?} is of type {found:?}, which is not supported");
+            self.report.error(&place, "unsupported-joint", message, instead_of_joint(found));
+        } else {
+            let message = format!("joint {name:?}: unknown type {found:?}");
+            let types = "types are fixed, revolute, continuous and prismatic";
+            let help = did_you_mean(closest(found, JOINT_TYPES), types);
+            self.report.error(&place, "unknown-joint-type", message, help);
+        }
         "floating"
     }
 
@@ -321,8 +337,7 @@ impl Lint<'_, '_> {
         if let Some(found) = origin.attribute("quat_xyzw").filter(|_| self.quaternions) {
             self.element(origin, &owner, &[("xyz", Numbers(3), LeftOut)]);
             let Some(q) = Numbers(4).numbers(found) else {
-                let (attribute, found, expected) = ("quat_xyzw", found.to_owned(), "four numbers");
-                self.report.error(&place, Problem::NotANumber { owner, attribute, found, expected });
+                self.not_a_number(&place, &owner, "quat_xyzw", found, "four numbers");
                 return None;
             };
             let q = UnitQuaternion::try_new(Quaternion::new(q[3], q[0], q[1], q[2]), 1e-12);
@@ -340,5 +355,17 @@ impl Lint<'_, '_> {
             self.report.warning(&place, "angle", message, "angles of a URDF are in rad");
         }
         None
+    }
+}
+
+/// Replacement for a joint type that is not supported.
+fn instead_of_joint(kind: &str) -> &'static str {
+    match kind {
+        "floating" => {
+            "the base is fixed here: make the joint fixed, or replace it by three prismatic and three revolute \
+             joints in series"
+        }
+        "planar" => "replace it by two prismatic and one continuous joint in series",
+        _ => "replace it by three revolute joints in series with links of small mass between",
     }
 }

@@ -143,7 +143,7 @@ pub fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshErr
     // Devices and pipes are refused, since a read may never end.
     let meta = std::fs::metadata(path).map_err(io_error)?;
     if !meta.is_file() {
-        return Err(io_error(std::io::Error::other("this is not a file")));
+        return Err(io_error(std::io::Error::other("this is not a file; give the path of a regular one")));
     }
     if meta.len() > LARGEST {
         let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());

@@ -4,10 +4,10 @@ use std::fmt;
 use std::path::Path;
 use std::rc::Rc;
 
+use flexarm_settings::Finding;
 use roxmltree::{Document, NodeType};
 
-use crate::error::Issue;
-use crate::finding::TextPosition;
+use crate::place::TextPosition;
 use crate::xml;
 
 /// Maximum nesting depth of elements.
@@ -34,7 +34,7 @@ impl At {
 
 impl fmt::Display for At {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}", self.file.display(), self.line)
+        write!(f, "{}:{}:{}", self.file.display(), self.line, self.column)
     }
 }
 
@@ -75,16 +75,12 @@ impl Element {
 }
 
 /// Parses a text and returns its root element.
-pub(crate) fn parse(text: &str, file: &Rc<Path>) -> Result<Element, Box<Issue>> {
+pub(crate) fn parse(text: &str, file: &Rc<Path>) -> Result<Element, Box<Finding>> {
     let lines = xml::Lines::new(file, text);
     let document = xml::parse(text, &lines)?;
     let deepest = document.descendants().find(|n| n.ancestors().nth(MAX_NESTED).is_some());
     if let Some(node) = deepest {
-        let problem = crate::Problem::Malformed {
-            found: format!("elements nested {MAX_NESTED} deep"),
-            expected: "fewer".to_owned(),
-        };
-        return Err(Box::new(Issue { place: lines.of(node), problem }));
+        return Err(Box::new(xml::issue(lines.of(node), format_args!("elements nested {MAX_NESTED} deep"), "fewer")));
     }
     Ok(element(&document, document.root_element(), &lines, file))
 }

@@ -32,11 +32,10 @@ use document::{At, Node};
 use expression::ExpressionError;
 use expression::value::{Value, int_of};
 
-use crate::error::XacroError;
-use crate::finding::{Finding, Severity, TextPosition};
+use crate::place::TextPosition;
 use crate::resolve::Resolver;
-use crate::{Issue, UrdfError, xml};
-use flexarm_settings::closest;
+use crate::{UrdfError, xml};
+use flexarm_settings::{Finding, Severity, closest};
 
 /// Maximum work for one document, approximately the number of bytes read and written.
 const MAX_WORK: usize = 100_000_000;
@@ -79,7 +78,7 @@ pub(crate) fn has_xacro(text: &str) -> bool {
 /// * `arguments`: values of `$(arg name)`.
 ///
 /// # Errors
-/// [`UrdfError::Xacro`] with the place in the file and the enclosing calls.
+/// [`UrdfError::Invalid`] with the place in the file and the enclosing calls.
 pub(crate) fn expand(
     text: &str,
     path: &Path,
@@ -96,7 +95,7 @@ pub(crate) fn expand(
     })
 }
 
-type Outcome<T> = Result<T, Box<XacroError>>;
+type Outcome<T> = Result<T, Box<Finding>>;
 
 /// Result of an element: nodes in its place, and attributes for the enclosing element.
 #[derive(Default)]
@@ -154,10 +153,9 @@ impl<'a> Interpreter<'a> {
     fn document(mut self, text: &str, path: &Path) -> Result<Expanded, UrdfError> {
         let given: Vec<String> = self.arguments.keys().cloned().collect();
         let file = self.files[0].clone();
-        let invalid = |issue: Box<Issue>| UrdfError::Invalid { issues: vec![*issue] };
-        let root = document::parse(text, &file).map_err(invalid)?;
+        let root = document::parse(text, &file)?;
         let scope = scope::Table::root();
-        let root = self.element(&root, &macros::Macros::new(), &scope).map_err(UrdfError::Xacro)?;
+        let root = self.element(&root, &macros::Macros::new(), &scope)?;
         self.doubt_arguments(&given, path);
         let has_links = root.elements().any(|e| e.name == "link");
         let idle = self.defined_macros.difference(&self.called_macros).cloned();
@@ -179,13 +177,8 @@ impl<'a> Interpreter<'a> {
                 (None, true) => "the file has no arguments".to_owned(),
                 (None, false) => format!("its arguments are {}", known.join(", ")),
             };
-            self.remarks.push(Finding {
-                severity: Severity::Warning,
-                code: "unused-argument",
-                location: format!("{}:1", path.display()),
-                message: format!("the argument {name:?} is given, but nothing in the file uses it"),
-                help,
-            });
+            let message = format!("the argument {name:?} is given, but nothing in the file uses it");
+            self.remarks.push(Finding::warning("unused-argument", format!("{}:1:1", path.display()), message, help));
         }
     }
 
@@ -237,20 +230,25 @@ impl<'a> Interpreter<'a> {
     }
 
     /// Creates an error at a place, with the enclosing calls and files.
-    fn fault(&self, at: &At, trouble: ExpressionError) -> Box<XacroError> {
+    fn fault(&self, at: &At, trouble: ExpressionError) -> Box<Finding> {
         let calls = self.calls.iter().rev().map(|(name, at)| format!("in the macro {name:?}, called at {at}"));
         let outer = self.files[..self.files.len().saturating_sub(1)].iter().rev();
         let files = outer.map(|file| format!("included from {}", file.display()));
         let trail = shortened_trail(calls.chain(files).collect());
-        Box::new(XacroError { place: at.place(), message: trouble.message, help: trouble.help, trail })
+        fault(at, trouble, &trail)
     }
 
     fn remark(&mut self, severity: Severity, code: &'static str, message: String, help: &str) {
         if self.remarks.len() < 100 {
-            let location = self.at.to_string();
-            self.remarks.push(Finding { severity, code, location, message, help: help.to_owned() });
+            self.remarks.push(Finding { severity, ..Finding::warning(code, self.at.to_string(), message, help) });
         }
     }
+}
+
+/// Error at a place, with the enclosing calls and files on a line each.
+fn fault(at: &At, trouble: ExpressionError, trail: &[String]) -> Box<Finding> {
+    let lines: String = trail.iter().map(|step| format!("\n  {step}")).collect();
+    Box::new(Finding::error("xacro", at.to_string(), trouble.message + &lines, trouble.help))
 }
 
 /// Keeps the ends of a long trail and omits the middle.

@@ -9,8 +9,7 @@ use super::expression::{ExpressionError, is_built_in};
 use super::macros::Macros;
 use super::scope::{self, Scope, Table};
 use super::{Content, ELEMENT, Interpreter, MAX_FILES, Outcome, boolean};
-use crate::error::XacroError;
-use crate::finding::Severity;
+use flexarm_settings::{Finding, Severity};
 
 impl Interpreter<'_> {
     /// Evaluates an element that is not xacro's, with all its content.
@@ -284,9 +283,11 @@ impl Interpreter<'_> {
         let text = self.read(path).map_err(|e| self.fault(at, e))?;
         let file: Rc<Path> = path.into();
         let root = parse(&text, &file).map_err(|issue| {
-            let (place, message, help) = (issue.place.clone(), issue.problem.to_string(), issue.problem.help());
-            let trail = vec![format!("included from {at}")];
-            Box::new(XacroError { place, message, help, trail })
+            Box::new(Finding {
+                code: "xacro".into(),
+                message: format!("{}\n  included from {at}", issue.message),
+                ..*issue
+            })
         })?;
         self.charge(2 * text.len()).map_err(|e| self.fault(at, e))?;
         for (name, value) in &root.attributes {

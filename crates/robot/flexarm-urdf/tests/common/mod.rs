@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use flexarm_urdf::{Problem, ReadOptions, parse_urdf};
+use flexarm_settings::Finding;
+use flexarm_urdf::{ReadOptions, parse_urdf};
 
 /// A temporary folder that is removed at the end.
 pub(crate) struct TestFolder(pub(crate) PathBuf);
@@ -64,20 +65,25 @@ pub(crate) fn with_joint(joint: &str) -> String {
 }
 
 /// Faults of a text and their lines.
-pub(crate) fn problems(text: &str) -> Vec<(u32, Problem)> {
+pub(crate) fn problems(text: &str) -> Vec<(u32, Finding)> {
     problems_with(text, &ReadOptions::default())
 }
 
-pub(crate) fn problems_with(text: &str, options: &ReadOptions) -> Vec<(u32, Problem)> {
+pub(crate) fn problems_with(text: &str, options: &ReadOptions) -> Vec<(u32, Finding)> {
     match parse_urdf(text, "robot.urdf", options) {
         Ok(_) => Vec::new(),
-        Err(error) => error.issues().iter().map(|i| (i.place.line, i.problem.clone())).collect(),
+        Err(error) => error.issues().iter().map(|issue| (line(issue), issue.clone())).collect(),
     }
+}
+
+/// Line of a finding in `robot.urdf`.
+pub(crate) fn line(finding: &Finding) -> u32 {
+    finding.location.split(':').nth(1).unwrap().parse().unwrap()
 }
 
 /// The only fault of a text.
 #[track_caller]
-pub(crate) fn problem(text: &str) -> (u32, Problem) {
+pub(crate) fn problem(text: &str) -> (u32, Finding) {
     let mut all = problems(text);
     assert_eq!(all.len(), 1, "{all:?}");
     all.remove(0)

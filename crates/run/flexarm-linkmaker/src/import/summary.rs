@@ -5,14 +5,14 @@ use std::fmt::Write as _;
 
 use flexarm_fem::matrix_link::MatrixReduction;
 use flexarm_fem::reduction::Superelement;
-use flexarm_fem::{Doubt, GateLimits, ModalLink, ReducedLink};
-use flexarm_settings::{Caveat, written};
+use flexarm_fem::{GateLimits, ModalLink, ReducedLink};
+use flexarm_settings::{Finding, written};
 use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::SECOND_ORDER_UNKNOWN;
 use crate::reduce::{
-    ModalFigures, PartFigures, ReportTable, coarse, doubted, matrix_table, modal_table, rows3, rows6, warning_list,
+    ModalFigures, PartFigures, ReportTable, about, coarse, matrix_table, modal_table, rows3, rows6, warning_list,
 };
 
 /// Result of `flexarm import`.
@@ -65,7 +65,7 @@ pub struct ImportSummary {
     /// Warnings.
     pub warnings: Vec<String>,
     /// The same warnings with code, value and reference value.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// Written files.
     pub files: ImportFiles,
 }
@@ -172,7 +172,7 @@ impl ImportSummary {
             cpu_s: 0.0,
             peak_rss_bytes: None,
             warnings: all.iter().map(|doubt| doubt.message.clone()).collect(),
-            caveats: all.into_iter().map(|doubt| doubted(&link.name, doubt)).collect(),
+            caveats: about(&link.name, all),
             files: ImportFiles::default(),
         }
     }
@@ -181,13 +181,14 @@ impl ImportSummary {
 /// Returns the doubts about the files and the link.
 ///
 /// * `mass`: relative error of the masses along x, y, z, and the masses (kg).
-fn doubts(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [f64; 3])>) -> Vec<Doubt> {
+fn doubts(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [f64; 3])>) -> Vec<Finding> {
     let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts } = reduction;
-    let mut all: Vec<Doubt> = warnings.iter().map(|sentence| Doubt::from_message("matrix-file", sentence)).collect();
+    let mut all: Vec<Finding> =
+        warnings.iter().map(|sentence| Finding::warning("matrix-file", "", sentence, "")).collect();
     all.extend(doubts.iter().cloned());
     if let Some((error, m)) = mass.filter(|(error, _)| error.is_nan() || *error > MASS_ERROR) {
         let sentence = format!("the mass matrix has {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
-        all.push(Doubt::found("mass", error, MASS_ERROR, sentence));
+        all.push(Finding::warning("mass", "", sentence, "").measured(error, MASS_ERROR));
     }
     all.extend(crate::yardsticks::of_link(link, whole));
     let first = held_frequencies_hz.first().zip(lumped_frequencies_hz.first());
@@ -197,14 +198,14 @@ fn doubts(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [
 
 /// Returns the figures of the modal link, stored or made of the superelement; adds a doubt about
 /// the latter if its second-order terms are unknown.
-fn modal_figures(link: &ReducedLink, doubts: &mut Vec<Doubt>) -> Option<ModalFigures> {
+fn modal_figures(link: &ReducedLink, doubts: &mut Vec<Finding>) -> Option<ModalFigures> {
     let details = link.details.as_deref()?;
     if let Some(stored) = &details.modal {
         return Some(ModalFigures::from(stored));
     }
     let modal = ModalLink::from_superelement(&link.name, details.superelement.as_ref()?).ok()?;
     if !modal.has_second_order() {
-        doubts.push(Doubt::from_message("second-order", SECOND_ORDER_UNKNOWN));
+        doubts.push(Finding::warning("second-order", "", SECOND_ORDER_UNKNOWN, ""));
     }
     Some(ModalFigures::from(&modal))
 }

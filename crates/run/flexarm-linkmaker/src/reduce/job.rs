@@ -185,7 +185,7 @@ impl ReduceJob {
         let mut bytes = Vec::new();
         // Reading a device may never end, opening a pipe may block.
         if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
-            return Err(unreadable(std::io::Error::other("this is not a file")));
+            return Err(unreadable(std::io::Error::other("this is not a file; give the path of a regular one")));
         }
         let file = std::fs::File::open(path).map_err(unreadable)?;
         file.take(LONGEST_JOB + 1).read_to_end(&mut bytes).map_err(unreadable)?;

@@ -36,7 +36,7 @@ use flexarm_fe_io::read_mesh;
 use flexarm_fem::mesh_link::ReductionStep;
 use flexarm_fem::stress::write_stress;
 use flexarm_fem::{UnitSystem, reduce_mesh, write_flex};
-use flexarm_settings::caveat;
+use flexarm_settings::finding::warnings;
 use flexarm_spatial::Pose;
 
 use crate::robot_entry::robot_entry;
@@ -57,7 +57,7 @@ pub use summary::{
     ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModalFigures, ModeFigures, PartFigures,
     PhaseFigures, ReduceFiles, ReduceSummary, RegionFigures, SolverFigures,
 };
-pub(crate) use summary::{coarse, doubted, rows3, rows6};
+pub(crate) use summary::{about, coarse, rows3, rows6};
 pub use urdf_link::{LinkJoint, UrdfLink};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
 pub(crate) use words::{MATERIAL_FORMS, SPLIT_FORMS};
@@ -141,9 +141,9 @@ impl Reduction {
         starts.push(stopwatch.wall_s());
 
         let mut summary = summary_of(&job, &plan, &file, units, &chosen, materials, &reduction);
-        let before: Vec<_> = doubts.into_iter().map(|doubt| doubted(&summary.link, doubt)).collect();
+        let before = about(&summary.link, doubts);
         summary.caveats.splice(0..0, before);
-        summary.warnings = caveat::warnings(&summary.caveats);
+        summary.warnings = warnings(&summary.caveats);
         summary.phases = phases(read_s, &starts);
         summary.wall_s = stopwatch.wall_s();
         summary.cpu_s = stopwatch.cpu_s();

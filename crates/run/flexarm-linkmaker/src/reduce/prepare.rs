@@ -8,8 +8,8 @@ use flexarm_fem::mesh_link::MeshLinkError;
 use flexarm_fem::model::AssemblyOptions;
 use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
 use flexarm_fem::sparse::{ModesWanted, Ordering};
-use flexarm_fem::{Doubt, GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
-use flexarm_settings::{Setting, Words};
+use flexarm_fem::{GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
+use flexarm_settings::{Finding, Setting, Words};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -29,7 +29,7 @@ pub(super) struct Prepared {
     pub(super) units: UnitSystem,
     pub(super) chosen: Vec<SelectedInterface>,
     pub(super) materials: Vec<RegionFigures>,
-    pub(super) doubts: Vec<Doubt>,
+    pub(super) doubts: Vec<Finding>,
 }
 
 /// Reads the mesh of a job in its own axes, SI, with its nodes merged as the job requests; also
@@ -89,8 +89,8 @@ pub(super) fn prepare(
     if !faults.is_empty() {
         return Err(LinkError::of_all(faults));
     }
-    let doubt = |code: &'static str| move |sentence: String| Doubt::from_message(code, sentence);
-    let mut doubts: Vec<Doubt> = warnings.into_iter().map(doubt("mesh-file")).collect();
+    let doubt = |code: &'static str| move |sentence: String| Finding::warning(code, "", sentence, "");
+    let mut doubts: Vec<Finding> = warnings.into_iter().map(doubt("mesh-file")).collect();
     doubts.extend(chosen.iter().flat_map(SelectedInterface::seat_doubts).map(doubt("interface-nodes")));
     doubts.extend(place.doubts(&chosen).into_iter().map(doubt("interface-frame")));
     doubts.extend(material_doubts(&file, units, &materials).into_iter().map(doubt("material")));

@@ -4,9 +4,9 @@ use flexarm_fe_io::mesh::MeshFile;
 use flexarm_fem::chain::Chain;
 use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
-use flexarm_fem::{Doubt, LinkPlan, Material, MeshGate, MeshReduction, ModalLink, ReducedLink, RigidPart, UnitSystem};
+use flexarm_fem::{LinkPlan, Material, MeshGate, MeshReduction, ModalLink, ReducedLink, RigidPart, UnitSystem};
 use flexarm_settings::Setting;
-use flexarm_settings::caveat::{self, Caveat};
+use flexarm_settings::finding::{self, Finding};
 use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 
@@ -83,7 +83,7 @@ pub struct ReduceSummary {
     /// Warnings.
     pub warnings: Vec<String>,
     /// The same warnings with code, value and reference value.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// Written files.
     pub files: ReduceFiles,
 }
@@ -436,7 +436,7 @@ pub(super) fn summary_of(
         wall_s: 0.0,
         cpu_s: 0.0,
         peak_rss_bytes: None,
-        warnings: caveat::warnings(&caveats),
+        warnings: finding::warnings(&caveats),
         caveats,
         files: ReduceFiles::default(),
     }
@@ -448,7 +448,7 @@ fn caveats_of(
     first_mode: Option<&ModeFigures>,
     chosen: &[SelectedInterface],
     nodes: usize,
-) -> Vec<Caveat> {
+) -> Vec<Finding> {
     let mut doubts = reduction.doubts.clone();
     doubts.extend(first_mode.iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
     doubts.extend(yardsticks::of_link(&reduction.link, &reduction.whole));
@@ -457,12 +457,12 @@ fn caveats_of(
         let off = (one.interface.X_LI.translation.vector - one.centroid).norm();
         yardsticks::of_point(&one.interface.name, off, one.extent.norm())
     }));
-    doubts.into_iter().map(|doubt| doubted(&reduction.link.name, doubt)).collect()
+    about(&reduction.link.name, doubts)
 }
 
 /// Returns warnings about interfaces that extend over a large share of the distance between the two
 /// farthest ones; `nodes` is the number of nodes of the mesh.
-fn spreads(chosen: &[SelectedInterface], nodes: usize) -> Vec<Doubt> {
+fn spreads(chosen: &[SelectedInterface], nodes: usize) -> Vec<Finding> {
     let place = |one: &SelectedInterface| one.interface.X_LI.translation.vector;
     let pairs = chosen.iter().enumerate().flat_map(|(k, a)| chosen[..k].iter().map(move |b| place(a) - place(b)));
     let Some(line) = pairs.max_by(|a, b| a.norm().total_cmp(&b.norm())) else { return Vec::new() };
@@ -478,14 +478,12 @@ fn spreads(chosen: &[SelectedInterface], nodes: usize) -> Vec<Doubt> {
 /// Relative errors of the first frequency above which a model is reported as too coarse.
 const COARSE_PARTS: f64 = 0.05;
 const MODES_MISS: f64 = 0.005;
-/// Code of the caveat about too few modes.
-const COARSE_MODES: &str = "coarse-modes";
 
 /// Returns warnings about reduced models with an inaccurate first frequency.
 ///
 /// * `source`: origin of the reference frequency: the mesh, or the matrices.
 /// * `parts`, `modes`: relative errors of the two rigid parts and of the kept modes.
-pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Vec<Doubt> {
+pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Vec<Finding> {
     let off = |error: Option<f64>, bound: f64| error.filter(|error| error.abs() > bound);
     let parts = off(parts, COARSE_PARTS).map(|error| {
         let percent = 100.0 * error;
@@ -493,29 +491,21 @@ pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Ve
             "the first frequency with two rigid parts differs from that of {source} by {percent:+.1} %, as it will \
              in a simulation with them"
         );
-        Doubt::found("coarse-parts", error, COARSE_PARTS, said)
+        Finding::warning("coarse-parts", "", said, "").measured(error, COARSE_PARTS)
     });
     let modes = off(modes, MODES_MISS).map(|error| {
         let percent = 100.0 * error;
         let setting = Setting::Modes;
         let said =
             format!("the first frequency with the kept modes differs by {percent:+.2} %: keep more modes ({setting})");
-        Doubt::found(COARSE_MODES, error, MODES_MISS, said)
+        Finding::warning("coarse-modes", "", said, "").measured(error, MODES_MISS).mended_by(&[Setting::Modes])
     });
     parts.into_iter().chain(modes).collect()
 }
 
-/// Converts a doubt about a link to a caveat.
-pub(crate) fn doubted(link: &str, doubt: Doubt) -> Caveat {
-    let Doubt { code, message, value, yardstick } = doubt;
-    let finite = |x: Option<f64>| x.filter(|x| x.is_finite());
-    let settings = if code == COARSE_MODES { vec![Setting::Modes] } else { Vec::new() };
-    Caveat {
-        value: finite(value),
-        yardstick: finite(yardstick),
-        settings,
-        ..Caveat::from_message(code, link, message, "")
-    }
+/// Names the link in warnings about it.
+pub(crate) fn about(link: &str, doubts: Vec<Finding>) -> Vec<Finding> {
+    doubts.into_iter().map(|doubt| Finding { location: link.into(), ..doubt }).collect()
 }
 
 pub(crate) fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {

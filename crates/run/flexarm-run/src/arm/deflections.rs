@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::arm::Arm;
 use crate::arm::options::RunOptions;
-use crate::error::{Error, ValueError};
+use crate::error::Error;
 use crate::motions::scenario::Scenario;
 use crate::run::prepare::{loaded, runnable};
 
@@ -56,7 +56,7 @@ impl Arm {
     /// [`Error::Interrupted`].
     ///
     /// # Errors
-    /// Per run: as [`Arm::simulate`]; [`ValueError::Factor`] unless both factors are positive.
+    /// Per run: as [`Arm::simulate`]; [`Error::Value`] unless both factors are positive.
     pub fn deflections(
         &self,
         runs: &[Variation],
@@ -95,10 +95,10 @@ impl Arm {
 
 impl Arm {
     /// Returns the springs with scaled stiffness and damping.
-    pub(crate) fn scaled_springs(&self, stiffness: f64, damping: f64) -> Result<Vec<Spring>, ValueError> {
+    pub(crate) fn scaled_springs(&self, stiffness: f64, damping: f64) -> Result<Vec<Spring>, Error> {
         for (what, found) in [("stiffness", stiffness), ("damping", damping)] {
             if !(found > 0.0 && found.is_finite()) {
-                return Err(ValueError::Factor { what, found });
+                return Err(Error::Value(format!("the factor of the {what} must be positive, found {found}")));
             }
         }
         let scaled = |spring: &Spring| {

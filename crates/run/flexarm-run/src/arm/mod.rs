@@ -19,8 +19,8 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::arm::bends::Bend;
 use crate::arm::options::Modelling;
-use crate::caveat::Caveat;
-use crate::error::{Error, PoseError};
+use crate::caveat::Finding;
+use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot::drive_entry::ServoEntry;
 use crate::robot::gear_entry::GearLaws;
@@ -55,7 +55,7 @@ pub struct Arm {
     /// Torque-driven joints: coordinate, servo, torque limit.
     pub(crate) torque: Vec<(usize, ServoEntry, f64)>,
     /// Caveats about the models of the links.
-    pub doubts: Vec<Caveat>,
+    pub doubts: Vec<Finding>,
     /// Index in `spans` of the springs under the base; they are the last span.
     pub(crate) mounting: Option<usize>,
     /// Reach of the mass or of the TCP, used as a length scale (m).
@@ -64,7 +64,7 @@ pub struct Arm {
     /// reason.
     pub modal_instead: Vec<String>,
     /// Result of [`Robot::caveats`], computed when it is first asked for.
-    pub(crate) robot_caveats: OnceLock<Vec<Caveat>>,
+    pub(crate) robot_caveats: OnceLock<Vec<Finding>>,
 }
 
 /// Owner of a spring.
@@ -83,7 +83,7 @@ impl Arm {
     }
 
     /// Returns [`Robot::caveats`], computed once.
-    pub fn robot_caveats(&self) -> &[Caveat] {
+    pub fn robot_caveats(&self) -> &[Finding] {
         self.robot_caveats.get_or_init(|| self.robot.caveats())
     }
 
@@ -150,7 +150,13 @@ impl Arm {
         if light.is_empty() {
             return Error::Step { source, partial: false };
         }
-        PoseError::WithoutInertia { path: self.robot.urdf_path.clone(), source, links: light }.into()
+        Error::Pose(format!(
+            "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> \
+             with mass and inertia, have them estimated (inertia_from_density in the robot file), or keep everything \
+             before them rigid",
+            self.robot.urdf_path.display(),
+            light.join(", ")
+        ))
     }
 
     /// Names the elastic bodies and torque-driven joints without inertia in some direction: rows of
@@ -200,10 +206,9 @@ impl Arm {
     }
 
     /// Returns the caveats about the models of the links.
-    pub fn link_caveats(&self) -> Vec<Caveat> {
+    pub fn link_caveats(&self) -> Vec<Finding> {
         let help = "write model = \"modal\" into the robot file";
-        let instead =
-            self.modal_instead.iter().map(|text| Caveat::from_message("third-interface", "links", text, help));
+        let instead = self.modal_instead.iter().map(|text| Finding::warning("third-interface", "links", text, help));
         self.doubts.iter().cloned().chain(instead).collect()
     }
 

@@ -9,17 +9,18 @@ use flexarm_flexlink::{
 };
 use flexarm_kinematics::{Coordinate, ElasticAngles, ElasticGroup, Model};
 use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
+use flexarm_settings::Setting;
 use flexarm_stepping::{Friction, GearCoupling, GeometricStiffness, Spring, SpringCurve};
 use nalgebra::DMatrix;
 
 use crate::arm::bends::bends;
 use crate::arm::options::{DriveModel, LinkModel, Modelling};
 use crate::arm::{Arm, Owner};
-use crate::caveat::Caveat;
+use crate::caveat::Finding;
 use crate::caveat::kinds;
 use crate::caveat::lumping;
 use crate::caveat::size::Size;
-use crate::error::{Error, ModellingError};
+use crate::error::Error;
 use crate::robot::drive_entry::{DriveKind, ServoEntry};
 use crate::robot::gear_entry::{GearLaws, RobotCoupling};
 use crate::robot::gearbox_entry::curves_with_play;
@@ -48,11 +49,11 @@ impl Robot {
     /// As [`Robot::model`], without a copy of the robot.
     pub(crate) fn modelled(self: Arc<Self>, modelling: &Modelling) -> Result<Arm, Error> {
         let ChosenLinks { links, doubts, modal_instead } = self.chosen_links(modelling)?;
-        let mut substituted = substitute(&self.rigid, &links).map_err(ModellingError::from)?;
+        let mut substituted = substitute(&self.rigid, &links).map_err(refused)?;
         let bends = bends(&substituted);
         let gearboxes: Vec<Gearbox> =
             self.drives.iter().filter_map(|drive| drive.gearbox_as(modelling.drives)).collect();
-        let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(ModellingError::from)?;
+        let gears = insert_gearboxes(&mut substituted.mechanism, &gearboxes).map_err(refused)?;
         let mounted = self.insert_mounting(&mut substituted, modelling)?;
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
@@ -100,10 +101,19 @@ impl Robot {
         // An option that applies to no link is an error.
         let modal = chosen.links.iter().filter(|link| matches!(link.form, LinkForm::Modal(_))).count();
         if let (Some(n), true) = (modelling.segments, modal == chosen.links.len()) {
-            return Err(ModellingError::NoLumpedLink { segments: n, modal_instead: chosen.modal_instead }.into());
+            let remedy = match chosen.modal_instead.is_empty() {
+                true => format!("add {} lumped", Setting::Links),
+                false => chosen.modal_instead.join("; "),
+            };
+            return Err(Error::Modelling(format!(
+                "{n} segments are requested, but no link of the robot is lumped: {remedy}"
+            )));
         }
         if let (Some(n), 0) = (modelling.modes, modal) {
-            return Err(ModellingError::NoModalLink { modes: n }.into());
+            return Err(Error::Modelling(format!(
+                "{n} modes are requested, but no link of the robot is modal: add {} modal",
+                Setting::Links
+            )));
         }
         Ok(chosen)
     }
@@ -118,7 +128,7 @@ impl Robot {
         if modelling.links == LinkModel::Rigid {
             return Ok(None);
         }
-        let (inserted, span) = insert_mounting(&mut substituted.mechanism, springs).map_err(ModellingError::from)?;
+        let (inserted, span) = insert_mounting(&mut substituted.mechanism, springs).map_err(refused)?;
         let owner = Owner::Link(substituted.spans.len());
         substituted.spans.push(span);
         let curves = curves_with_play(springs.K_S.diagonal().as_slice(), play);
@@ -238,7 +248,7 @@ impl Robot {
     /// one: a link loaded at a third interface becomes modal, because rigid parts with springs have
     /// only two interfaces.
     pub(crate) fn form_of(&self, link: &RobotLink, modelling: &Modelling) -> Result<(LinkForm, Option<String>), Error> {
-        let form = link.form(modelling).map_err(ModellingError::NoSuchModel)?;
+        let form = link.form(modelling)?;
         let branches =
             if matches!(form, LinkForm::Modal(_)) { Vec::new() } else { branch_joints(&self.rigid, &link.flexible) };
         let Some(BranchJoint { joint, interface }) = branches.first() else { return Ok((form, None)) };
@@ -246,25 +256,27 @@ impl Robot {
         let why =
             format!("joint {joint:?} is on its interface {interface:?}, and a lumped link has only two interfaces");
         let modelling = Modelling { links: LinkModel::Modal, ..*modelling };
-        let modal = link.form(&modelling).map_err(|instead| ModellingError::Branch {
-            link: name.clone(),
-            why: why.clone(),
-            instead: Box::new(instead),
-        })?;
+        let modal =
+            link.form(&modelling).map_err(|instead| Error::Modelling(format!("link {name:?}: {why}; {instead}")))?;
         Ok((modal, Some(format!("link {name:?} is modal (model = \"modal\"): {why}"))))
     }
+}
+
+/// Error about a link, gearbox or mounting that does not fit the tree.
+fn refused(error: impl std::fmt::Display) -> Error {
+    Error::Modelling(error.to_string())
 }
 
 /// Flexible links with the model chosen for each.
 #[derive(Default)]
 struct ChosenLinks {
     links: Vec<FlexibleLink>,
-    doubts: Vec<Caveat>,
+    doubts: Vec<Finding>,
     modal_instead: Vec<String>,
 }
 
 /// Returns the caveats about a link in this form.
-fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Caveat> {
+fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Finding> {
     let mut doubts = Vec::new();
     let is_modal = matches!(form, LinkForm::Modal(_));
     if is_modal && link.stress == Some(StressSource::Beam) {
@@ -274,11 +286,11 @@ fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Caveat> {
     if matches!(form, LinkForm::Modal(modal) if !modal.has_second_order()) {
         let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.link);
         let help = "reduce the mesh itself (flexarm reduce) to have them";
-        doubts.push(Caveat::from_message("second-order-unknown", "links", text, help));
+        doubts.push(Finding::warning("second-order-unknown", "links", text, help));
     }
     if matches!(form, LinkForm::Chain(_)) && link.angles == ElasticAngles::EulerZyx {
         let text = format!("link {:?}: {EULER_CHAIN}", link.link);
-        doubts.push(Caveat::from_message("euler-chain", "links", text, "leave angles away: rotation vectors"));
+        doubts.push(Finding::warning("euler-chain", "links", text, "leave angles away: rotation vectors"));
     }
     doubts
 }
@@ -294,12 +306,14 @@ struct OwnedSpring {
 /// Sorts springs and their owners into the order of the model's elastic coordinates.
 ///
 /// # Errors
-/// [`ModellingError::NoStiffness`] for a group without a spring.
-fn in_coordinate_order(model: &Model, owned: Vec<OwnedSpring>) -> Result<(Vec<Spring>, Vec<Owner>), ModellingError> {
+/// [`Error::Modelling`] for a group without a spring.
+fn in_coordinate_order(model: &Model, owned: Vec<OwnedSpring>) -> Result<(Vec<Spring>, Vec<Owner>), Error> {
     let mut by_group: HashMap<String, (Spring, Owner)> =
         owned.into_iter().map(|owned| (owned.group, (owned.spring, owned.owner))).collect();
     let of_group = |group: &ElasticGroup| {
-        by_group.remove(&group.name).ok_or_else(|| ModellingError::NoStiffness { joint: group.name.clone() })
+        by_group
+            .remove(&group.name)
+            .ok_or_else(|| Error::Modelling(format!("elastic joint {joint:?} has no stiffness", joint = group.name)))
     };
     model.elastic().iter().map(of_group).collect::<Result<Vec<_>, _>>().map(|found| found.into_iter().unzip())
 }

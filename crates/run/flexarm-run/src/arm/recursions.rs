@@ -15,8 +15,9 @@ use nalgebra::{DVector, Matrix6xX};
 use rayon::prelude::*;
 
 use crate::arm::Arm;
-use crate::error::{Error, LoadError, PoseError};
+use crate::error::Error;
 use crate::motions::applied_load::frame_of;
+use crate::motions::applied_load::unknown_frame;
 use crate::robot::Robot;
 use crate::robot::loops;
 
@@ -87,11 +88,8 @@ impl Recursions {
     /// [`Error::Load`] with the available links.
     pub fn frame(&self, name: &str) -> Result<Frame, Error> {
         let frames = || self.model.frames().iter().filter(|frame| !frame.name.starts_with("__"));
-        let unknown = || LoadError::UnknownFrame {
-            frame: name.to_owned(),
-            known: frames().map(|frame| frame.name.clone()).collect(),
-        };
-        frame_of(name, &self.model).cloned().ok_or_else(|| unknown().into())
+        let known = || frames().map(|frame| frame.name.clone()).collect::<Vec<_>>();
+        frame_of(name, &self.model).cloned().ok_or_else(|| Error::Load(unknown_frame(name, &known())))
     }
 
     /// Computes generalised forces `τ = M q̈ + bias` of m motions, m×n (N m or N).
@@ -216,7 +214,7 @@ impl Recursions {
         let n = self.model.nv();
         let m = out.len() / width.max(1);
         if let Some(wrong) = inputs.iter().find(|input| input.len() != m * n) {
-            return Err(PoseError::Samples { found: wrong.len(), times: m, joints: n }.into());
+            return Err(Error::samples(wrong.len(), m, n));
         }
         let row = |k: usize| inputs.map(|input| &input[k * n..][..n]);
         let several = |space: &mut Space, first: usize, out: &mut [f64]| -> Result<(), Error> {

@@ -6,7 +6,7 @@ use nalgebra::DVector;
 
 use super::size::spread_poses;
 use super::slip::{EFFORT, Factor, slip};
-use super::{Caveat, kinds};
+use super::{Finding, kinds};
 
 /// Maximum balancer torque relative to the maximum gravity torque: note, warning.
 const STRONG: [f64; 2] = [3.0, 10.0];
@@ -16,7 +16,7 @@ const RAISED: f64 = 1.1;
 const WEAK: f64 = 1e-3;
 
 /// Returns all of these caveats, over poses spread over the joint ranges.
-pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> {
+pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Finding> {
     if rigid.balancers().is_empty() {
         return Vec::new();
     }

@@ -3,7 +3,7 @@
 use flexarm_kinematics::{Joint, Mechanism};
 
 use super::size::Size;
-use super::{Caveat, CaveatKind, kinds};
+use super::{Finding, FindingKind, kinds};
 use crate::robot::drive_entry::{Drive, DriveKind};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
@@ -15,8 +15,8 @@ const ARM_LIKE: f64 = 0.2;
 const FEWEST: usize = 3;
 
 /// Returns all of these caveats about a loaded robot.
-pub(crate) fn of_chain(robot: &Robot, size: &Size) -> Vec<Caveat> {
-    let mut caveats: Vec<Caveat> =
+pub(crate) fn of_chain(robot: &Robot, size: &Size) -> Vec<Finding> {
+    let mut caveats: Vec<Finding> =
         of_place(robot, size, "the TCP", &robot.tcp.0, [&kinds::TCP_FIXED, &kinds::TCP_INSIDE]).into_iter().collect();
     if let Some(joint) = robot.rigid.joints.iter().find(|joint| joint.child == PAYLOAD_LINK) {
         caveats.extend(of_payload(robot, size, "the payload", &joint.parent));
@@ -26,13 +26,13 @@ pub(crate) fn of_chain(robot: &Robot, size: &Size) -> Vec<Caveat> {
 }
 
 /// Checks for a payload on a link beyond which the arm continues.
-pub(crate) fn of_payload(robot: &Robot, size: &Size, what: &str, link: &str) -> Option<Caveat> {
+pub(crate) fn of_payload(robot: &Robot, size: &Size, what: &str, link: &str) -> Option<Finding> {
     of_place(robot, size, what, link, [&kinds::PAYLOAD_FIXED, &kinds::PAYLOAD_INSIDE])
 }
 
 /// Checks the link of something that belongs to the end of the arm. Kinds of caveats: no joint
 /// moves the link; the arm continues beyond it.
-fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]: [&CaveatKind; 2]) -> Option<Caveat> {
+fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]: [&FindingKind; 2]) -> Option<Finding> {
     let mechanism = &robot.urdf.mechanism;
     let location = format!("{what} on link {link:?}");
     let body = carrier(mechanism, link);
@@ -97,7 +97,7 @@ impl DistalPart {
 
 /// Finds rigid joints where most others of the arm are elastic, or with elastic joints on both
 /// sides.
-fn stiff_joints(robot: &Robot) -> Vec<Caveat> {
+fn stiff_joints(robot: &Robot) -> Vec<Finding> {
     let elastic = |drive: &Drive| drive.kind != DriveKind::Prescribed && drive.gearbox.is_some();
     let yields = |joint: &Joint| robot.drives.iter().any(|drive| drive.joint == joint.name && elastic(drive));
     let (mechanism, moving) = (&robot.urdf.mechanism, moving(robot));

@@ -9,7 +9,7 @@ use flexarm_kinematics::{Mechanism, Model};
 use super::links::{CREEP, USUAL_DAMPING};
 use super::size::inertia_moved;
 use super::slip::{self, slip};
-use super::{Caveat, kinds};
+use super::{Finding, kinds};
 use crate::robot::drive_entry::{Drive, DriveKind};
 
 /// Effort limit above which drives have stiff gears (N m); weaker drives may contain springs on
@@ -60,7 +60,7 @@ const POSITION_GAIN: f64 = 1000.0;
 const STABLE: f64 = 2.0;
 
 /// Returns all caveats about the drives as written.
-pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) -> Vec<Caveat> {
+pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) -> Vec<Finding> {
     let mut caveats = Vec::new();
     let heaviest = inertia_moved(rigid);
     let heaviest = heaviest.iter().zip(rigid.coordinates());
@@ -129,7 +129,7 @@ fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option
 
 /// Checks stiffness, damping and backlash of a gearbox; `others`: median rotation of the robot's
 /// other gears (rad).
-fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
+fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Finding> {
     let (Some((k, along)), Some((_, gear))) = (stiffness(drive), &drive.gearbox) else { return Vec::new() };
     let mut caveats = Vec::new();
     let turned = effort / k;
@@ -177,7 +177,7 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Caveat> {
 }
 
 /// Checks transmission error and hysteresis.
-fn errors(drive: &Drive) -> Vec<Caveat> {
+fn errors(drive: &Drive) -> Vec<Finding> {
     let Some((_, gear)) = &drive.gearbox else { return Vec::new() };
     let mut caveats = Vec::new();
     let ripple = gear.transmission.iter().map(|harmonic| harmonic.amplitude).sum::<f64>();
@@ -197,7 +197,7 @@ fn errors(drive: &Drive) -> Vec<Caveat> {
 }
 
 /// Checks ratio and rotor.
-fn motor(drive: &Drive, heaviest: f64) -> Vec<Caveat> {
+fn motor(drive: &Drive, heaviest: f64) -> Vec<Finding> {
     let mut caveats = Vec::new();
     let ratio = drive.ratio.abs();
     if !RATIO.contains(&ratio) {
@@ -217,7 +217,7 @@ fn motor(drive: &Drive, heaviest: f64) -> Vec<Caveat> {
 }
 
 /// Checks whether friction exceeds the effort limit.
-fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Caveat> {
+fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Finding> {
     let f = &drive.friction;
     let viscous = if speed.is_finite() { f.viscous * speed } else { 0.0 };
     let torque = (f.coulomb + f.stribeck).max(viscous);
@@ -233,7 +233,7 @@ fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Caveat> {
 }
 
 /// Checks whether friction acts well below the speed limit.
-fn smoothing(drive: &Drive, speed: f64) -> Option<Caveat> {
+fn smoothing(drive: &Drive, speed: f64) -> Option<Finding> {
     let f = &drive.friction;
     let rubs = f.coulomb + f.stribeck + drive.load_friction > 0.0;
     let (width, most) = (f.regularisation, SMOOTHING * speed);
@@ -242,7 +242,7 @@ fn smoothing(drive: &Drive, speed: f64) -> Option<Caveat> {
 }
 
 /// Checks sampling and position gain of a servo.
-fn servo(drive: &Drive) -> Vec<Caveat> {
+fn servo(drive: &Drive) -> Vec<Finding> {
     let mut caveats = Vec::new();
     if drive.kind != DriveKind::Torque {
         return caveats;
@@ -260,14 +260,14 @@ fn servo(drive: &Drive) -> Vec<Caveat> {
 
 /// Checks whether a velocity gain makes the sampled loop unstable; `inertia` is the
 /// high-frequency inertia (kg m²).
-pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) -> Option<Caveat> {
+pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) -> Option<Finding> {
     let most = STABLE * inertia / sample_s;
     (inertia > 0.0 && gain > most).then(|| kinds::VELOCITY_GAIN.found(format!("joint {joint:?}"), gain, most))
 }
 
 /// Checks the deflection of a drive's spring, in rotation (rad) and translation (m); `times` scales
 /// the limits: 1 under gravity, 2 in motion.
-pub(crate) fn give(drive: &Drive, effort: f64, rotation: f64, translation: f64, times: f64) -> Vec<Caveat> {
+pub(crate) fn give(drive: &Drive, effort: f64, rotation: f64, translation: f64, times: f64) -> Vec<Finding> {
     let [unusual, wrong] = SAGS[usize::from(effort <= STRONG)].map(|limit| times * limit);
     let mut caveats = Vec::new();
     // Weak drives may deflect in motion by design.

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use super::links::outside;
 use super::size::Size;
 use super::slip::{self, slip};
-use super::{Caveat, kinds};
+use super::{Finding, kinds};
 use crate::robot::Robot;
 use crate::robot::calibration_entry::Calibration;
 use crate::robot::gauge_entry::Gauge;
@@ -33,8 +33,8 @@ const CALIBRATION: [f64; 2] = [0.05, 0.05];
 const FAR: f64 = 1.5;
 
 /// Returns all of these caveats.
-pub(crate) fn of_entries(robot: &Robot) -> Vec<Caveat> {
-    let mut caveats: Vec<Caveat> = robot.flexible_links.iter().flat_map(strength).collect();
+pub(crate) fn of_entries(robot: &Robot) -> Vec<Finding> {
+    let mut caveats: Vec<Finding> = robot.flexible_links.iter().flat_map(strength).collect();
     caveats.extend(robot.gauges.iter().flat_map(|gauge| of_gauge(gauge, &robot.flexible_links)));
     caveats.extend(of_guides(robot));
     caveats.extend(robot.calibration.iter().flat_map(calibration));
@@ -42,7 +42,7 @@ pub(crate) fn of_entries(robot: &Robot) -> Vec<Caveat> {
 }
 
 /// Checks the strength of a link's material.
-fn strength(link: &RobotLink) -> Vec<Caveat> {
+fn strength(link: &RobotLink) -> Vec<Finding> {
     let Some(strength) = &link.strength else { return Vec::new() };
     let name = |what: &str| format!("the {what} strength of link {:?}", link.flexible.link);
     let factors = &[(1e-6, "MPa"), (1e-9, "GPa"), (1e3, "GPa for MPa")];
@@ -64,7 +64,7 @@ fn strength(link: &RobotLink) -> Vec<Caveat> {
 }
 
 /// Checks the angle of a grid and the place of a gauge on a beam.
-fn of_gauge(gauge: &Gauge, links: &[RobotLink]) -> Vec<Caveat> {
+fn of_gauge(gauge: &Gauge, links: &[RobotLink]) -> Vec<Finding> {
     let mut caveats = Vec::new();
     if let Some((_, angle)) = gauge.grid
         && angle != 0.0
@@ -98,7 +98,7 @@ fn of_gauge(gauge: &Gauge, links: &[RobotLink]) -> Vec<Caveat> {
 }
 
 /// Checks the guides of telescopic joints against size and weight of the robot.
-fn of_guides(robot: &Robot) -> Vec<Caveat> {
+fn of_guides(robot: &Robot) -> Vec<Finding> {
     let size = Size::of(&robot.rigid);
     let moment = 9.81 * size.mass * size.extent;
     let mut caveats = Vec::new();
@@ -134,7 +134,7 @@ fn of_guides(robot: &Robot) -> Vec<Caveat> {
 }
 
 /// Checks the size of a calibration.
-fn calibration(of: &Calibration) -> Vec<Caveat> {
+fn calibration(of: &Calibration) -> Vec<Finding> {
     let name = |what: &str| format!("{what} of the calibration of joint {:?}", of.joint);
     let [most_m, most_rad] = CALIBRATION;
     let values = [

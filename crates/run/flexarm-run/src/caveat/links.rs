@@ -10,7 +10,7 @@ use flexarm_settings::Setting;
 use flexarm_stepping::Damping;
 
 use super::slip::{self, slip};
-use super::{Caveat, CaveatKind, kinds};
+use super::{Finding, FindingKind, kinds};
 use crate::arm::options::LinkModel;
 use crate::body_change::BodyChange;
 use crate::robot::Robot;
@@ -53,9 +53,9 @@ const RATIO: RangeInclusive<f64> = 1e-3..=0.2;
 pub(crate) const CREEP: f64 = 0.05;
 
 /// Returns all of these caveats about a link. `own`: its inertia in the URDF.
-pub(crate) fn of_link(link: &RobotLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
+pub(crate) fn of_link(link: &RobotLink, own: Option<&LinkInertia>) -> Vec<Finding> {
     let name = format!("link {:?}", link.flexible.link);
-    let mut caveats: Vec<Caveat> = damping(&name, &link.damping).into_iter().collect();
+    let mut caveats: Vec<Finding> = damping(&name, &link.damping).into_iter().collect();
     if let Some(beam) = &link.beam {
         if !matches!(beam.section, Section::Given(_)) {
             caveats.extend(material(&name, &beam.material));
@@ -70,7 +70,7 @@ pub(crate) fn of_link(link: &RobotLink, own: Option<&LinkInertia>) -> Vec<Caveat
 }
 
 /// Compares the body of the parts with that of the URDF, if the parts do not take it from there.
-fn body(name: &str, link: &RobotLink, own: &LinkInertia) -> Option<Caveat> {
+fn body(name: &str, link: &RobotLink, own: &LinkInertia) -> Option<Finding> {
     let RobotLink { flexible, .. } = link;
     let (length, body) = (flexible.reduced.p_AB().norm(), flexible.reduced.rigid());
     let change = BodyChange::of(own, &body);
@@ -88,13 +88,13 @@ fn body(name: &str, link: &RobotLink, own: &LinkInertia) -> Option<Caveat> {
         Some(_) => "leave parts = \"uniform\" out, unless the URDF's inertia is wrong",
         None => "compare the mesh of the .flex file with the URDF",
     };
-    let caveat = Caveat { value: Some(change.shift), ..Caveat::from_message("uniform-mass", name, message, help) };
+    let caveat = Finding { value: Some(change.shift), ..Finding::warning("uniform-mass", name, message, help) };
     // Moments of inertia alone change no static torque.
     Some(if change.shift < SHIFT * length { caveat.as_note() } else { caveat })
 }
 
 /// Checks whether requested geometric stiffening is available for the link.
-fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
+fn geometric(name: &str, link: &RobotLink) -> Option<Finding> {
     let (message, help) = match (link.choices.model, link.has_geometric()) {
         _ if !link.choices.geometric => return None,
         (_, false) => (
@@ -107,7 +107,7 @@ fn geometric(name: &str, link: &RobotLink) -> Option<Caveat> {
             format!("add model = \"modal\", or run with {} modal", Setting::Links),
         ),
     };
-    Some(Caveat::from_message("geometric-stiffening", name, message, &help))
+    Some(Finding::warning("geometric-stiffening", name, message, &help))
 }
 
 /// Maximum sink (m) of the base under the weight of the whole robot, and maximum tilt (rad) under
@@ -118,10 +118,10 @@ const SINKS: [f64; 2] = [1e-3, 5e-3];
 const RIGID_SINK: f64 = 1e-9;
 
 /// Checks the springs under the base.
-pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
+pub(crate) fn of_mounting(robot: &Robot) -> Vec<Finding> {
     let Some(RobotMounting::Springs { springs, damping: damped, .. }) = &robot.mounting else { return Vec::new() };
     let name = format!("mounting {:?}", springs.name);
-    let mut caveats: Vec<Caveat> = damping(&name, damped).into_iter().collect();
+    let mut caveats: Vec<Finding> = damping(&name, damped).into_iter().collect();
     let links = robot.rigid.links.iter().filter_map(|link| link.inertia).map(|inertia| inertia.mass);
     let weight = 9.81 * (links.sum::<f64>() + springs.inertia.map_or(0.0, |inertia| inertia.mass));
     let K = &springs.K_S;
@@ -147,7 +147,7 @@ pub(crate) fn of_mounting(robot: &Robot) -> Vec<Caveat> {
 }
 
 /// Checks elastic constants and density.
-fn material(name: &str, material: &Material) -> impl Iterator<Item = Caveat> {
+fn material(name: &str, material: &Material) -> impl Iterator<Item = Finding> {
     let young = outside(&kinds::MODULUS, name, material.E, &YOUNG, slip::MODULUS);
     let rho = outside(&kinds::MATERIAL_DENSITY, name, material.rho, &RHO, slip::DENSITY);
     let nu = outside(&kinds::POISSON, name, material.nu, &NU, &[(100.0, "per cent")]);
@@ -156,18 +156,18 @@ fn material(name: &str, material: &Material) -> impl Iterator<Item = Caveat> {
 
 /// Returns a caveat if a value is outside its range, with the nearer end as threshold.
 pub(super) fn outside(
-    kind: &CaveatKind,
+    kind: &FindingKind,
     name: &str,
     value: f64,
     range: &RangeInclusive<f64>,
     factors: &[slip::Factor],
-) -> Option<Caveat> {
+) -> Option<Finding> {
     let end = if value < *range.start() { *range.start() } else { *range.end() };
     (!range.contains(&value)).then(|| kind.found(name, value, end).likely(slip(value, range, factors, 1.0)))
 }
 
 /// Checks the section relative to the beam's length, and its mass relative to the link's.
-fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
+fn section(name: &str, beam: &BeamLink) -> Vec<Finding> {
     let mut caveats = Vec::new();
     let length = beam.length;
     let thick = beam.section.largest_size().unwrap_or(0.0);
@@ -208,7 +208,7 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Caveat> {
 /// ```text
 /// F e² l/GJ < 0.01 F l³/(3 EI_y)      e_max = l √(0.01 GJ/(3 EI_y))
 /// ```
-fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Caveat> {
+fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Finding> {
     let e = beam.section.properties(beam.material.nu).ok()?.shear_centre_y.abs();
     let most = beam.length * (TWIST * bar.GJ / (3.0 * bar.EI_y)).sqrt();
     (e > most).then(|| kinds::SHEAR_CENTRE.found(name, e, most))
@@ -216,7 +216,7 @@ fn shear_centre(name: &str, beam: &BeamLink, bar: &Bar) -> Option<Caveat> {
 
 /// Checks for a wall that is too thin for its width, and for an outer size that is half or twice
 /// that indicated by the link's inertia.
-fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> {
+fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Finding> {
     let mut caveats = Vec::new();
     let (width, wall) = match beam.section {
         Section::Box { width, height, wall } => (width.min(height), wall),
@@ -254,7 +254,7 @@ fn sizes(name: &str, beam: &BeamLink, own: Option<&LinkInertia>) -> Vec<Caveat> 
 }
 
 /// Checks damping as written; its effect on the first mode is checked at the pose.
-fn damping(name: &str, damping: &Damping) -> Option<Caveat> {
+fn damping(name: &str, damping: &Damping) -> Option<Finding> {
     match damping {
         Damping::Modal(0.0) | Damping::StiffnessProportional(0.0) | Damping::Rayleigh(0.0, 0.0) => {
             Some(kinds::NO_DAMPING.found(name, 0.0, USUAL_DAMPING))

@@ -3,7 +3,7 @@
 use flexarm_kinematics::Model;
 use flexarm_trajectory::Trajectory;
 
-use super::{Caveat, CaveatKind, kinds};
+use super::{Finding, FindingKind, kinds};
 use crate::robot::loops::{along_motion, over_ranges};
 
 /// Transmission angle: note below the first, warning below the second (rad). At 10 degrees a rod
@@ -19,7 +19,7 @@ fn name_of(name: &str) -> String {
 }
 
 /// Checks all loops of the rigid robot over poses spread over the joint ranges.
-pub(crate) fn of_loops(rigid: &Model) -> Vec<Caveat> {
+pub(crate) fn of_loops(rigid: &Model) -> Vec<Finding> {
     if rigid.loops().is_empty() {
         return Vec::new();
     }
@@ -43,7 +43,7 @@ pub(crate) fn of_loops(rigid: &Model) -> Vec<Caveat> {
 }
 
 /// Checks the loops along a motion on which they close.
-pub(crate) fn of_motion(trajectory: &Trajectory, rigid: &Model) -> Vec<Caveat> {
+pub(crate) fn of_motion(trajectory: &Trajectory, rigid: &Model) -> Vec<Finding> {
     if rigid.loops().is_empty() {
         return Vec::new();
     }
@@ -58,7 +58,7 @@ pub(crate) fn of_motion(trajectory: &Trajectory, rigid: &Model) -> Vec<Caveat> {
     }
     for (c, [low, high]) in rigid.dependent().iter().zip(&seen.range) {
         let passed =
-            |kind: &CaveatKind, value: f64, limit: f64| kind.found(format!("joint {:?}", c.joint), value, limit);
+            |kind: &FindingKind, value: f64, limit: f64| kind.found(format!("joint {:?}", c.joint), value, limit);
         if *high > c.limits.upper {
             caveats.push(passed(&kinds::LOOP_LIMIT, *high, c.limits.upper));
         }

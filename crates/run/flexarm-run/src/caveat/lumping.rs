@@ -1,4 +1,4 @@
-//! Caveat about rigid parts that do not converge to their mesh: open profiles, whose sections warp,
+//! Finding about rigid parts that do not converge to their mesh: open profiles, whose sections warp,
 //! and links whose section is not the same along the line from A to B.
 
 use flexarm_fem::ModalLink;
@@ -7,7 +7,7 @@ use flexarm_flexlink::LinkForm;
 use flexarm_settings::Setting;
 use nalgebra::{DVector, Vector3};
 
-use super::{Caveat, Severity};
+use super::{Finding, Severity};
 use crate::robot::robot_link::RobotLink;
 use crate::run::monitor::stress::without_attached;
 
@@ -23,7 +23,7 @@ const STORED: usize = 6;
 
 /// Compares the rigid parts of a link with the modes of its mesh; returns a caveat if they are
 /// farther off than those of a uniform beam would be.
-pub(crate) fn of_parts(link: &RobotLink, form: &LinkForm) -> Option<Caveat> {
+pub(crate) fn of_parts(link: &RobotLink, form: &LinkForm) -> Option<Finding> {
     let reduced = &link.flexible.reduced;
     let modal = reduced.details.as_ref()?.modal.as_ref()?;
     let chain = match form {
@@ -58,8 +58,8 @@ pub(crate) fn of_parts(link: &RobotLink, form: &LinkForm) -> Option<Caveat> {
         Setting::Links
     );
     let severity = if matches!(form, LinkForm::TwoParts) { Severity::Note } else { Severity::Warning };
-    let caveat = Caveat::from_message("parts-off", format!("link {:?}", link.flexible.link), message, &help);
-    Some(Caveat { severity, value: Some(sag), yardstick: Some(bound), ..caveat })
+    let caveat = Finding::warning("parts-off", format!("link {:?}", link.flexible.link), message, &help);
+    Some(Finding { severity, value: Some(sag), yardstick: Some(bound), ..caveat })
 }
 
 /// Maximum difference of the displacement of B under the own weight along x, y or z from that of

@@ -2,7 +2,7 @@
 //! validity.
 //!
 //! Every command that uses a robot reports the same caveats about it ([`Arm::caveats`](crate::Arm::caveats)); runs and statics
-//! add their own. Each message is built in one place ([`CaveatKind::found`]). Start at `kinds`, the
+//! add their own. Each message is built in one place ([`FindingKind::found`]). Start at `kinds`, the
 //! catalogue; `docs/caveats.md` lists it with the source of each threshold.
 //!
 //! Not here: inputs that make a model impossible, which are an [`crate::Error`].
@@ -27,6 +27,6 @@ pub mod slip;
 pub(crate) mod stiffness;
 pub mod validity;
 
-pub use flexarm_settings::caveat::{Caveat, Severity};
-pub use flexarm_settings::caveat::{CaveatKind, once_each, warnings};
+pub use flexarm_settings::finding::{Finding, Severity};
+pub use flexarm_settings::finding::{FindingKind, once_each, warnings};
 pub use of_use::Use;

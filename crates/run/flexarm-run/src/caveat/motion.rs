@@ -8,7 +8,7 @@ use nalgebra::DVector;
 
 use super::size::Size;
 use super::slip::{self, DEGREES, slip};
-use super::{Caveat, kinds};
+use super::{Finding, kinds};
 
 /// Number of time intervals at which a motion and its loads are checked.
 const TIMES: usize = 200;
@@ -25,7 +25,7 @@ const HEAVY: [f64; 2] = [2.0, 10.0];
 const EARTH: f64 = 9.81;
 
 /// Checks the torques and speeds of the rigid robot along a motion.
-pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> Vec<Caveat> {
+pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> Vec<Finding> {
     let n = model.nv();
     let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
     let (mut torque, mut speed) = (vec![0.0f64; n], vec![0.0f64; n]);
@@ -81,7 +81,7 @@ pub(crate) fn degrees(violations: &[LimitViolation], model: &Model) -> &'static 
 
 /// Checks the maximum force and moment of a run's loads against weight and size of the arm with its
 /// payload.
-pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat> {
+pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Finding> {
     let mut caveats = Vec::new();
     for load in loads {
         let even = (0..=TIMES).map(|i| duration * i as f64 / TIMES as f64);
@@ -97,14 +97,14 @@ pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Caveat
 }
 
 /// Checks a constant wrench on the TCP against weight and size of the arm with its payload.
-pub fn of_wrench(wrench: &[f64; 6], size: &Size) -> Vec<Caveat> {
+pub fn of_wrench(wrench: &[f64; 6], size: &Size) -> Vec<Finding> {
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     heavy(norm(&wrench[..3]), norm(&wrench[3..]), size)
 }
 
 /// Checks a force (N) and a moment (N m) against the weight of the arm.
-fn heavy(force: f64, moment: f64, size: &Size) -> Vec<Caveat> {
-    let judged = |kind: &super::CaveatKind, what: &str, value: f64, yardstick: f64| {
+fn heavy(force: f64, moment: f64, size: &Size) -> Vec<Finding> {
+    let judged = |kind: &super::FindingKind, what: &str, value: f64, yardstick: f64| {
         let caveat = kind.found(what, value, yardstick);
         let likely = slip(value, &(0.0..=HEAVY[0] * yardstick), slip::EFFORT, 1.0);
         let caveat = if value > HEAVY[1] * yardstick { caveat.likely(likely) } else { caveat.as_note() };

@@ -8,7 +8,7 @@ use flexarm_trajectory::LimitViolation;
 use nalgebra::Vector6;
 
 use super::size::{Size, middle};
-use super::{Caveat, motion, once_each, validity};
+use super::{Finding, motion, once_each, validity};
 use crate::arm::Arm;
 use crate::arm::options::Modelling;
 use crate::error::Error;
@@ -34,7 +34,7 @@ pub enum Use<'a> {
 impl Arm {
     /// Returns all caveats about the robot as modelled and about its use by a command, without
     /// duplicates.
-    pub fn caveats(self: &Arc<Self>, used: Use<'_>) -> Vec<Caveat> {
+    pub fn caveats(self: &Arc<Self>, used: Use<'_>) -> Vec<Finding> {
         let (arm, robot) = (self, self.robot());
         let mut caveats = of_model(arm);
         let (pose, wrench) = match used {
@@ -62,12 +62,7 @@ impl Arm {
             Ok(caveats)
         });
         caveats.extend(standing.unwrap_or_else(|error| {
-            vec![Caveat::from_message(
-                "no-equilibrium",
-                "robot",
-                error.to_string(),
-                "check stiffness, masses and units",
-            )]
+            vec![Finding::warning("no-equilibrium", "robot", error.to_string(), "check stiffness, masses and units")]
         }));
         once_each(caveats)
     }
@@ -75,19 +70,19 @@ impl Arm {
 
 /// As [`Arm::caveats`], for a robot as modelled by its file, in commands that compute nothing with its
 /// links and drives.
-pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Caveat>, Error> {
+pub(crate) fn of_robot(robot: &Robot) -> Result<Vec<Finding>, Error> {
     Ok(robot.model(&Modelling::default())?.caveats(Use::Any))
 }
 
 /// Returns the caveats about a robot's files, and about its links and drives as modelled.
-pub(crate) fn of_model(arm: &Arm) -> Vec<Caveat> {
+pub(crate) fn of_model(arm: &Arm) -> Vec<Finding> {
     arm.robot_caveats().iter().cloned().chain(arm.link_caveats()).collect()
 }
 
 /// Returns the caveats about a motion on a robot.
-pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
+pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Finding> {
     let mut caveats = motion.caveats();
-    let passed = |v: &LimitViolation| Caveat::from_message("joint-limit", &v.joint, format!("joint limit: {v}"), "");
+    let passed = |v: &LimitViolation| Finding::warning("joint-limit", &v.joint, format!("joint limit: {v}"), "");
     caveats.extend(motion.violations.iter().map(passed));
     caveats.extend(motion::of_motion(&motion.name, &motion.trajectory, rigid));
     caveats
@@ -95,7 +90,7 @@ pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Caveat> {
 
 /// Returns the caveats about the loads and payloads of a scenario. Those that do not fit the robot
 /// are an error of the command instead.
-fn of_scenario(arm: &Arm, scenario: &Scenario) -> Vec<Caveat> {
+fn of_scenario(arm: &Arm, scenario: &Scenario) -> Vec<Finding> {
     let robot = arm.robot();
     let Ok(acting) = scenario.acting_on(robot, &arm.model) else { return Vec::new() };
     let loads = motion::of_loads(&acting.loads, scenario.duration_s(), &Size::of(&robot.rigid));
@@ -103,7 +98,7 @@ fn of_scenario(arm: &Arm, scenario: &Scenario) -> Vec<Caveat> {
 }
 
 /// Returns the caveats about the arm at rest at a pose, under a wrench on the TCP.
-pub(crate) fn at_rest(posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+pub(crate) fn at_rest(posed: &Posed, linear: &Linear, wrench: &[f64; 6]) -> Vec<Finding> {
     let mut caveats = posed.caveats();
     caveats.extend(motion::of_wrench(wrench, &Size::of(&posed.arm.robot().rigid)));
     caveats.extend(posed.validity(linear));

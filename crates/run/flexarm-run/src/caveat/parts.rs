@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::size::{Size, gyration, inertia_moved, least_density, weight_carried};
 use super::slip::{self, slip};
-use super::{Caveat, kinds};
+use super::{Finding, kinds};
 use crate::robot::{PAYLOAD_LINK, Robot};
 
 /// Distance of a TCP or payload from its link that is out of reach: multiple of the robot's size,
@@ -36,10 +36,10 @@ const TIP_ACCELERATION: f64 = 5e4;
 const GRAVITIES: [(f64, &str); 3] = [(1.62, "on the moon"), (3.71, "on Mars"), (9.81, "")];
 
 /// Returns all of these caveats about a loaded robot.
-pub(crate) fn of_robot(robot: &Robot) -> Vec<Caveat> {
+pub(crate) fn of_robot(robot: &Robot) -> Vec<Finding> {
     let mechanism = &robot.urdf.mechanism;
     let size = Size::of(mechanism);
-    let mut caveats: Vec<Caveat> = distances(mechanism, &size).collect();
+    let mut caveats: Vec<Finding> = distances(mechanism, &size).collect();
     caveats.extend(bodies(mechanism, &size));
     caveats.extend(gravity(&robot.rigid.gravity));
     let tool = robot.tcp.1.translation.vector.norm();
@@ -59,14 +59,14 @@ pub(crate) fn of_robot(robot: &Robot) -> Vec<Caveat> {
 }
 
 /// Checks for angles of more than a turn (rad).
-pub(crate) fn angles(of: &str, values: &[f64]) -> Option<Caveat> {
+pub(crate) fn angles(of: &str, values: &[f64]) -> Option<Finding> {
     let largest = values.iter().fold(0.0f64, |m, x| m.max(x.abs()));
     let caveat = || kinds::ANGLE.found(of, largest, TURN);
     (largest > TURN + 1e-9).then(|| caveat().likely(slip(largest, &(0.0..=TURN), slip::ANGLE, 1.0)))
 }
 
 /// Checks for a distance from the link larger than the size of the robot.
-fn far(what: &str, distance: f64, size: &Size) -> Option<Caveat> {
+fn far(what: &str, distance: f64, size: &Size) -> Option<Finding> {
     let limit = (FAR.0 * size.extent).max(FAR.1);
     let caveat = || kinds::FAR.found(what, distance, size.extent);
     (distance > limit).then(|| caveat().likely(slip(distance, &(0.0..=limit), slip::LENGTH, 1.0)))
@@ -74,7 +74,7 @@ fn far(what: &str, distance: f64, size: &Size) -> Option<Caveat> {
 
 /// Checks for joints farther apart than any real arm is long, or than the rest of this arm
 /// suggests.
-fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item = Caveat> + 'a {
+fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item = Finding> + 'a {
     let length = |j: &Joint| j.X_PJ.translation.vector.norm();
     let all: f64 = mechanism.joints.iter().map(length).sum();
     let odd = mechanism.joints.iter().filter_map(move |joint| {
@@ -91,7 +91,7 @@ fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item
 
 /// Checks masses and inertias: radius of gyration against the size of the arm, density against that
 /// of osmium.
-fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
+fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Finding> {
     let with_mass = || {
         let of = |l: &Link| l.inertia.filter(|i| i.mass > 0.0).map(|i| (l.name.clone(), i));
         mechanism.links.iter().filter_map(of)
@@ -118,7 +118,7 @@ fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
 }
 
 /// Checks the magnitude and the direction of gravity.
-pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
+pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Finding> {
     let size = g.norm();
     let near = |(place, _): &&(f64, &str)| (size / place - 1.0).abs() < 0.03;
     match GRAVITIES.iter().find(near) {
@@ -127,7 +127,7 @@ pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
         Some((_, "")) => {
             let way = if g.z > 0.99 * size { "upwards: the arm hangs from a ceiling" } else { "not along -z" };
             let message = format!("gravity points {way} in the axes of the base");
-            Some(Caveat { value: Some(g.z), yardstick: Some(-9.81), ..tilted(message) })
+            Some(Finding { value: Some(g.z), yardstick: Some(-9.81), ..tilted(message) })
         }
         Some((_, words)) => Some(kinds::GRAVITY.found("gravity", size, 9.81).likely(*words).as_note()),
         None => {
@@ -139,14 +139,14 @@ pub(crate) fn gravity(g: &Vector3<f64>) -> Option<Caveat> {
     }
 }
 
-fn tilted(message: String) -> Caveat {
+fn tilted(message: String) -> Finding {
     let help = "right for a robot on a wall, a ceiling or a slope; else turn gravity over";
-    Caveat { unit: "m/s2".into(), ..Caveat::from_message("gravity-direction", "gravity", message, help) }.as_note()
+    Finding { unit: "m/s2".into(), ..Finding::warning("gravity-direction", "gravity", message, help) }.as_note()
 }
 
 /// Checks a payload; `inertia.com` is in the axes of the link that carries it.
-pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bool) -> Vec<Caveat> {
-    let mut caveats: Vec<Caveat> = far(what, inertia.com.norm(), size).into_iter().collect();
+pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bool) -> Vec<Finding> {
+    let mut caveats: Vec<Finding> = far(what, inertia.com.norm(), size).into_iter().collect();
     if inertia.mass <= 0.0 {
         return caveats;
     }
@@ -179,7 +179,7 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
 }
 
 /// Checks for speeds and ranges that look like degrees.
-fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
+fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Finding> {
     let turning: Vec<&Joint> = mechanism.joints.iter().filter(|j| j.kind.turns()).collect();
     let fast = turning.iter().filter(|j| j.limits.velocity.is_finite() && j.limits.velocity > FAST.0).map(|joint| {
         let speed = joint.limits.velocity;
@@ -205,7 +205,7 @@ fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Caveat> {
 const NO_WEIGHT: f64 = 1e-4;
 
 /// Checks for effort limits far above the gravity and inertia torques of the arm.
-fn strong_drives(model: &Model, size: &Size) -> Option<Caveat> {
+fn strong_drives(model: &Model, size: &Size) -> Option<Finding> {
     let weight = weight_carried(model);
     let most = weight.iter().fold(0.0f64, |m, w| m.max(*w));
     // A joint with a nearly vertical axis only carries the gravity torque due to its misalignment,

@@ -3,7 +3,7 @@
 use flexarm_stepping::Plant;
 
 use super::drives::{give, speed_loop};
-use super::{Caveat, kinds};
+use super::{Finding, kinds};
 use crate::arm::{Arm, Owner};
 
 /// TCP sag relative to the size of the arm: note, warning.
@@ -28,7 +28,7 @@ pub(crate) struct ArmAtRest<'a> {
 
 impl ArmAtRest<'_> {
     /// Returns all of these caveats.
-    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+    pub(crate) fn caveats(&self) -> Vec<Finding> {
         let extent = self.arm.extent;
         let mut caveats = self.gears();
         if extent > 0.0 && self.sag_m > SAG[0] * extent {
@@ -40,7 +40,7 @@ impl ArmAtRest<'_> {
         caveats
     }
 
-    fn gears(&self) -> Vec<Caveat> {
+    fn gears(&self) -> Vec<Finding> {
         let mut caveats = Vec::new();
         for (element, owner) in self.plant.elements.iter().zip(&self.arm.owners) {
             let Owner::Drive(k) = owner else { continue };
@@ -62,7 +62,7 @@ impl ArmAtRest<'_> {
     }
 
     /// Checks frequency and damping of the first mode.
-    fn first_mode(&self, extent: f64) -> Vec<Caveat> {
+    fn first_mode(&self, extent: f64) -> Vec<Finding> {
         let modes = &self.plant.modes;
         let Some(omega) = modes.omega.first() else { return Vec::new() };
         let hz = omega / std::f64::consts::TAU;
@@ -82,7 +82,7 @@ impl ArmAtRest<'_> {
         caveats
     }
 
-    fn speed_loops(&self) -> Vec<Caveat> {
+    fn speed_loops(&self) -> Vec<Finding> {
         let Some(servo) = &self.plant.servo else { return Vec::new() };
         let n = self.plant.model.n_actuated();
         let mut q = nalgebra::DVector::zeros(n);

@@ -5,7 +5,7 @@ use flexarm_linkmaker::yardsticks::{SOUND, sound_speed};
 use nalgebra::{Matrix6, Vector6};
 
 use super::slip::{self, slip};
-use super::{Caveat, kinds};
+use super::{Finding, kinds};
 use crate::robot::robot_link::RobotLink;
 
 /// Maximum stiffness ratio, or inverse ratio, of measured links to their beam or mesh in any
@@ -22,14 +22,14 @@ const SLOWEST: f64 = 50.0;
 const UNITS: &[slip::Factor] = &[(1e3, "N mm or m N"), (1e-3, "kN or N/mm"), (1e6, "mN"), (1e-6, "MN")];
 
 /// Returns all of these caveats about a link with two interfaces.
-pub(crate) fn of_stiffness(name: &str, link: &RobotLink) -> Vec<Caveat> {
-    let mut caveats: Vec<Caveat> = given(name, link).into_iter().collect();
+pub(crate) fn of_stiffness(name: &str, link: &RobotLink) -> Vec<Finding> {
+    let mut caveats: Vec<Finding> = given(name, link).into_iter().collect();
     caveats.extend(sound(name, link));
     caveats
 }
 
 /// Compares the two-part stiffness with that of the source.
-fn given(name: &str, link: &RobotLink) -> Option<Caveat> {
+fn given(name: &str, link: &RobotLink) -> Option<Finding> {
     let source = link.flexible.reduced.split.K_S;
     let own = link.scaled(&source);
     let [least, most] = ratios(&own, &source)?;
@@ -81,7 +81,7 @@ fn coupling(K: &Matrix6<f64>) -> f64 {
 }
 
 /// Checks the speed of sound along the link by its stiffness and mass.
-fn sound(name: &str, link: &RobotLink) -> Option<Caveat> {
+fn sound(name: &str, link: &RobotLink) -> Option<Finding> {
     let reduced = &link.flexible.reduced;
     let apart = (reduced.X_LB.translation.vector - reduced.X_LA.translation.vector).norm();
     // The interfaces of a beam are joint frames, which may coincide.

@@ -1,11 +1,11 @@
 //! Loads as values, for programs that do not use a loads file.
 
 use flexarm_kinematics::{Frame, Model, Wrench};
-use flexarm_settings::Quantity;
+use flexarm_settings::{Quantity, known_names};
 use flexarm_stepping::{Load, TimedWrench};
 
-use crate::caveat::Caveat;
-use crate::error::{Error, LoadError};
+use crate::caveat::Finding;
+use crate::error::Error;
 use crate::motions::loads_file::LoadLocation;
 use crate::robot::TCP_FRAME;
 
@@ -19,7 +19,7 @@ pub struct AppliedLoad {
     /// Start time (s), if there is one.
     pub start_s: Option<f64>,
     /// Caveats about the load as written.
-    pub(crate) doubts: Vec<Caveat>,
+    pub(crate) doubts: Vec<Finding>,
     /// Location in the file, if read from one.
     pub(crate) written: Option<LoadLocation>,
 }
@@ -53,7 +53,13 @@ impl AppliedLoad {
     /// times that do not increase.
     pub fn sampled(frame: &str, t: &[f64], F: &[Wrench]) -> Result<Self, Error> {
         if t.len() != F.len() || t.len() < 2 || t.windows(2).any(|pair| pair[1].is_nan() || pair[1] <= pair[0]) {
-            return Err(LoadError::Samples { times: t.len(), wrenches: F.len() }.into());
+            let message = format!(
+                "a load needs at least two samples, one wrench for each time, and times that increase; found {} \
+                 times and {} wrenches",
+                t.len(),
+                F.len()
+            );
+            return Err(Error::Load(message));
         }
         let (times, F) = (t.to_vec(), F.to_vec());
         let wrench = {
@@ -75,8 +81,8 @@ impl AppliedLoad {
     /// Returns the load on a model, up to the end of a run (s).
     pub(crate) fn on(&self, model: &Model, duration_s: f64) -> Result<Load, Error> {
         let frame = frame_of(&self.frame, model).filter(|frame| frame.body > 0).ok_or_else(|| {
-            let known = moving_links(model).into_iter().map(str::to_owned).collect();
-            LoadLocation::frame(self.written.as_ref(), LoadError::UnknownFrame { frame: self.frame.clone(), known })
+            let known: Vec<String> = moving_links(model).into_iter().map(str::to_owned).collect();
+            LoadLocation::frame(self.written.as_ref(), unknown_frame(&self.frame, &known))
         })?;
         let jumps: Vec<f64> = self.wrench.jumps.iter().copied().filter(|t| *t <= duration_s).collect();
         for F in jumps.iter().map(|t| (self.wrench.value)(*t)) {
@@ -97,4 +103,9 @@ pub fn moving_links(model: &Model) -> Vec<&str> {
 /// Returns the frame with this name; `tcp` is the TCP frame.
 pub(crate) fn frame_of<'m>(name: &str, model: &'m Model) -> Option<&'m Frame> {
     model.frame(if name == "tcp" { TCP_FRAME } else { name })
+}
+
+/// Text about a frame that is neither the TCP nor a link that moves.
+pub(crate) fn unknown_frame(frame: &str, known: &[String]) -> String {
+    format!("load on frame {frame:?}: expected \"tcp\" or a link that moves, of {}", known_names(frame, known))
 }

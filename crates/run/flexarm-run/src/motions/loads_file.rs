@@ -18,8 +18,8 @@ use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use crate::caveat::{self, Caveat};
-use crate::error::{Error, LoadError};
+use crate::caveat::{self, Finding};
+use crate::error::Error;
 use crate::motions::applied_load::AppliedLoad;
 use crate::motions::load_jumps::jumps_of;
 use crate::motions::payload::PayloadChange;
@@ -118,24 +118,24 @@ impl LoadLocation {
     }
 
     /// Error about the value as a whole, with its location if it was read from a file.
-    pub(crate) fn entry(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
-        Self::error(written.map(|written| &written.entry), cause.into())
+    pub(crate) fn entry(written: Option<&Self>, cause: impl ToString) -> Error {
+        Self::error(written.map(|written| &written.entry), cause.to_string())
     }
 
     /// Error about the frame or link.
-    pub(crate) fn frame(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
-        Self::error(written.map(|written| &written.frame), cause.into())
+    pub(crate) fn frame(written: Option<&Self>, cause: impl ToString) -> Error {
+        Self::error(written.map(|written| &written.frame), cause.to_string())
     }
 
     /// Error about the inertia.
-    pub(crate) fn inertia(written: Option<&Self>, cause: impl Into<LoadError>) -> Error {
-        Self::error(written.map(|written| &written.inertia), cause.into())
+    pub(crate) fn inertia(written: Option<&Self>, cause: impl ToString) -> Error {
+        Self::error(written.map(|written| &written.inertia), cause.to_string())
     }
 
-    fn error(place: Option<&RobotFileError>, cause: LoadError) -> Error {
+    fn error(place: Option<&RobotFileError>, message: String) -> Error {
         match place {
-            Some(place) => RobotFileError { message: cause.to_string(), ..place.clone() }.into(),
-            None => cause.into(),
+            Some(place) => RobotFileError { message, ..place.clone() }.into(),
+            None => Error::Load(message),
         }
     }
 }
@@ -200,7 +200,7 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
 
 /// Caveats about angles that look like degrees: the phase of a sine, arguments of sin and cos in
 /// expressions.
-fn doubts(e: &LoadEntry) -> Vec<Caveat> {
+fn doubts(e: &LoadEntry) -> Vec<Finding> {
     let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
     caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
 }

@@ -7,8 +7,8 @@ use flexarm_kinematics::{Coordinate, Model};
 use flexarm_stepping::PrescribedMotion;
 use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, Samples, Trajectory, foreign_joints};
 
-use crate::caveat::{self, Caveat};
-use crate::error::{Error, PoseError, ValueError};
+use crate::caveat::{self, Finding};
+use crate::error::Error;
 use crate::motions::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent};
 use crate::motions::tool_path::{Cell, ToolPath};
 use crate::robot::Robot;
@@ -41,7 +41,7 @@ pub struct Motion {
     /// Joints in the file that the robot does not have; they are ignored.
     pub dropped: Vec<String>,
     /// Choices, assumptions and omissions made when reading the file.
-    pub notes: Vec<Caveat>,
+    pub notes: Vec<Finding>,
 }
 
 /// Joint that the motion does not contain.
@@ -132,7 +132,7 @@ impl Motion {
         let n = actuated.len();
         if q.len() != n * t.len() {
             let (found, times) = (q.len(), t.len());
-            return Err(PoseError::Samples { found, times, joints: n }.into());
+            return Err(Error::samples(found, times, n));
         }
         let column = |k: usize| q.iter().skip(k).step_by(n.max(1)).copied().collect();
         let joint = |(k, c): (usize, &Coordinate)| JointSamples {
@@ -234,7 +234,9 @@ impl Motion {
     /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if values overflow.
     pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
         if !(seconds > 0.0 && seconds.is_finite()) {
-            return Err(ValueError::CornerTime(seconds).into());
+            return Err(Error::Value(format!(
+                "corners are rounded within a positive time, found {seconds} s: try 0.02"
+            )));
         }
         let trajectory = self.trajectory.with_rounded_corners(seconds)?;
         let warnings = warnings(&trajectory, &self.path);
@@ -243,30 +245,30 @@ impl Motion {
     }
 
     /// Returns the caveats about the motion.
-    pub fn caveats(&self) -> Vec<Caveat> {
+    pub fn caveats(&self) -> Vec<Finding> {
         let file = self.path.display().to_string();
-        let told = self.warnings.iter().map(|text| Caveat::from_message("trajectory", &file, text, ""));
+        let told = self.warnings.iter().map(|text| Finding::warning("trajectory", &file, text, ""));
         self.notes.iter().cloned().chain(self.dropped_caveat()).chain(told).chain(self.held_note()).collect()
     }
 
-    fn dropped_caveat(&self) -> Option<Caveat> {
+    fn dropped_caveat(&self) -> Option<Finding> {
         let file = self.path.display().to_string();
         let names: Vec<String> = self.dropped.iter().map(|name| format!("{name:?}")).collect();
         let message = format!("{file}: joints that the robot does not have are left out: {}", names.join(", "));
         let help = "a gripper is one; a joint of the arm is not";
-        (!names.is_empty()).then(|| Caveat::from_message("motion-dropped-joints", &file, message, help))
+        (!names.is_empty()).then(|| Finding::warning("motion-dropped-joints", &file, message, help))
     }
 
     /// Caveats about held joints: a note for positions given in the robot file, a warning for
     /// assumed ones.
-    fn held_note(&self) -> Vec<Caveat> {
+    fn held_note(&self) -> Vec<Finding> {
         let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
         let file = self.path.display().to_string();
         let note = |held: &[&HeldJoint], end: &str| {
             let places: Vec<String> = held.iter().map(|held| format!("{:?} at {}", held.joint, held.at)).collect();
             let places = places.join(", ");
             let message = format!("{file}: joints that the motion does not name are held: {places}{end}");
-            Caveat::from_message("held-joints", &file, message, "name them in the motion to move them")
+            Finding::warning("held-joints", &file, message, "name them in the motion to move them")
         };
         let assumed =
             (!assumed.is_empty()).then(|| note(&assumed, " ([hold] in the robot file says where, in rad or m)"));

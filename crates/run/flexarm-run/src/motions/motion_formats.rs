@@ -8,7 +8,7 @@ use flexarm_motion_io::{
     MCAP_MAGIC, MessageMotion, MotionError, Request, SQLITE_MAGIC, ZSTD_MAGIC, looks_like_messages, read_db3,
     read_folder, read_mcap, read_packed, read_text,
 };
-use flexarm_settings::{Caveat, Setting};
+use flexarm_settings::{Finding, Setting};
 use flexarm_trajectory::{ColumnMap, JointLimits, KnownJoint, TableRequest, Trajectory, text_of_file};
 
 use crate::error::Error;
@@ -37,7 +37,7 @@ pub(crate) struct ReadMotion {
     pub(crate) samples: Option<usize>,
     /// Joints of the file that the robot does not have, if that is not an error.
     pub(crate) dropped: Vec<String>,
-    pub(crate) caveats: Vec<Caveat>,
+    pub(crate) caveats: Vec<Finding>,
     /// Planned TCP path, if the motion is given as one.
     pub(crate) tool_path: Option<ToolPath>,
 }

@@ -220,10 +220,10 @@ fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajecto
 }
 
 /// Splits caveats into the messages of warnings and of notes.
-fn messages(caveats: &[caveat::Caveat], own: Vec<String>) -> (Vec<String>, Vec<String>) {
+fn messages(caveats: &[caveat::Finding], own: Vec<String>) -> (Vec<String>, Vec<String>) {
     let (notes, warnings): (Vec<_>, Vec<_>) =
         caveats.iter().partition(|caveat| caveat.severity == caveat::Severity::Note);
-    let text = |caveats: Vec<&caveat::Caveat>| caveats.into_iter().map(|c| c.message.clone()).collect::<Vec<_>>();
+    let text = |caveats: Vec<&caveat::Finding>| caveats.into_iter().map(|c| c.message.clone()).collect::<Vec<_>>();
     let mut warnings = text(warnings);
     warnings.extend(own.into_iter().filter(|text| !warnings.contains(text)).collect::<Vec<_>>());
     (warnings, text(notes))
@@ -237,7 +237,7 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     crate::robot::loops::along_motion(&model, &trajectory)?;
     let torques = torques(&trajectory, &model);
     let mut caveats = caveat::of_use::of_robot(robot)?;
-    let violations = |caveat: &caveat::Caveat| caveat.code == "joint-limit"; // in `violations`
+    let violations = |caveat: &caveat::Finding| caveat.code == "joint-limit"; // in `violations`
     caveats.extend(caveat::of_use::of_motion(&motion, &model).into_iter().filter(|caveat| !violations(caveat)));
     let (warnings, notes) = messages(&caveats, Vec::new());
 

@@ -1,11 +1,11 @@
 //! Payloads that are picked up and put down during a run.
 
 use flexarm_kinematics::{LinkInertia, Model, Pose, SpatialInertia};
-use flexarm_settings::Quantity;
+use flexarm_settings::{Quantity, known_names};
 use flexarm_stepping::InertiaChange;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::error::{Error, PayloadError};
+use crate::error::Error;
 use crate::motions::applied_load::moving_links;
 use crate::motions::loads_file::LoadLocation;
 use crate::robot::{PAYLOAD_LINK, Robot};
@@ -54,11 +54,11 @@ impl PayloadChange {
 
     /// Returns the change on a model of the robot; `earlier`: preceding changes.
     pub(crate) fn on(&self, robot: &Robot, model: &Model, earlier: &[InertiaChange]) -> Result<InertiaChange, Error> {
-        let fail = |cause: PayloadError| LoadLocation::entry(self.written.as_ref(), cause);
+        let fail = |cause: &str| LoadLocation::entry(self.written.as_ref(), cause);
         let LinkInertia { mass, com, inertia_com } = &self.carried;
         let mut numbers = [self.at_s, *mass].into_iter().chain(com.iter().copied()).chain(inertia_com.iter().copied());
         if numbers.any(|x| !x.is_finite()) || *mass < 0.0 || self.at_s < 0.0 {
-            return Err(fail(PayloadError::Numbers));
+            return Err(fail("a payload needs a time and a mass of at least 0, and finite numbers"));
         }
         let ranges = [
             Quantity::TIME.check_all("the time of the payload", [&self.at_s]),
@@ -72,13 +72,16 @@ impl PayloadChange {
             .map_err(|cause| LoadLocation::entry(self.written.as_ref(), cause))?;
         let (link, body, X_BF) = self.carrier(robot, model)?;
         if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
-            return Err(LoadLocation::inertia(self.written.as_ref(), PayloadError::NegativeMoment));
+            return Err(LoadLocation::inertia(
+                self.written.as_ref(),
+                "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz",
+            ));
         }
-        let mut inertia =
-            without_payload(robot, model, body).ok_or_else(|| fail(PayloadError::OtherLink { link: link.clone() }))?;
+        let mut inertia = without_payload(robot, model, body)
+            .ok_or_else(|| fail(&format!("the robot's own payload does not ride on link {link:?}: give that link")))?;
         if let Some(other) = earlier.iter().find(|c| c.body != body) {
             let first = model.bodies()[other.body].name.clone();
-            return Err(fail(PayloadError::TwoBodies { first, second: link }));
+            return Err(fail(&format!("payloads on two bodies ({first:?} and {link:?}): one changes in a run")));
         }
         if *mass > 0.0 {
             inertia += self.carried.spatial().at_parent(&X_BF);
@@ -88,18 +91,21 @@ impl PayloadChange {
 
     /// Returns the carrying link, its body, and its frame on the body.
     fn carrier(&self, robot: &Robot, model: &Model) -> Result<(String, usize, Pose), Error> {
-        let fail = |cause: PayloadError| LoadLocation::frame(self.written.as_ref(), cause);
+        let fail = |cause: &str| LoadLocation::frame(self.written.as_ref(), cause);
         let own = || robot.rigid.joints.iter().find(|j| j.child == PAYLOAD_LINK).map(|j| j.parent.clone());
         let link = self.link.clone().or_else(own).unwrap_or_else(|| robot.tcp.0.clone());
         let frame = model.frame(&link).filter(|f| f.body > 0).ok_or_else(|| {
-            let known = moving_links(model).into_iter().map(str::to_owned).collect();
-            fail(PayloadError::UnknownLink { link: link.clone(), known })
+            let known: Vec<String> = moving_links(model).into_iter().map(str::to_owned).collect();
+            fail(&format!("payload link {link:?}: expected a link that moves, of {}", known_names(&link, &known)))
         })?;
         if robot.flexible_links.iter().any(|f| f.flexible.link == link)
             && model.frame(&format!("{link}__distal")).is_some()
         {
-            let beyond = robot.urdf.mechanism.child_joints(&link).map(|j| j.child.clone()).collect();
-            return Err(fail(PayloadError::Bends { link, beyond }));
+            let beyond: Vec<_> = robot.urdf.mechanism.child_joints(&link).map(|j| j.child.clone()).collect();
+            return Err(fail(&format!(
+                "payload link {link:?} is flexible, so that the position of the payload on it is not defined: name a \
+                 link beyond it, of {beyond:?}"
+            )));
         }
         Ok((link, frame.body, frame.X_BF))
     }

@@ -11,7 +11,7 @@ use flexarm_kinematics::Model;
 use flexarm_stepping::{InertiaChange, Load, Start};
 
 use crate::caveat::size::Size;
-use crate::caveat::{Caveat, chain, loads, parts};
+use crate::caveat::{Finding, chain, loads, parts};
 use crate::error::Error;
 use crate::motions::applied_load::AppliedLoad;
 use crate::motions::loads_file::read_loads;
@@ -118,7 +118,7 @@ impl Scenario {
             }
             if let Some(start) = load.start_s.filter(|start| *start >= duration) {
                 let text = format!("a load starts at {start} s, the run ends at {duration} s: it does nothing");
-                acting.caveats.push(Caveat::from_message("no-effect", "loads", text, "move it into the run"));
+                acting.caveats.push(Finding::warning("no-effect", "loads", text, "move it into the run"));
             }
         }
         let size = Size::of(&robot.urdf.mechanism);
@@ -136,7 +136,7 @@ impl Scenario {
             }
             if at > duration {
                 let text = format!("the payload changes at {at} s, the run ends at {duration} s: it stays as it is");
-                acting.caveats.push(Caveat::from_message("no-effect", "loads", text, "move it into the run"));
+                acting.caveats.push(Finding::warning("no-effect", "loads", text, "move it into the run"));
             }
         }
         Ok(acting)
@@ -173,5 +173,5 @@ pub struct Disturbances {
     pub changes: Vec<InertiaChange>,
     /// Caveats about values without effect, and about payloads that are implausibly heavy or far
     /// away.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::arm::Arm;
 use crate::arm::options::Modelling;
-use crate::caveat::{self, Caveat, Use};
+use crate::caveat::{self, Finding, Use};
 use crate::error::Error;
 use crate::poses::posed::{all_finite, pose_of};
 use crate::robot::balancer::{self, BalancerInfo};
@@ -65,7 +65,7 @@ pub struct Inspection {
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
     /// Probable errors in the input.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// A movable joint; limits are null where there are none.

@@ -6,13 +6,14 @@ use std::sync::Arc;
 use flexarm_analysis::{DampedMode, tcp_error};
 use flexarm_kinematics::{Frame, forward_kinematics};
 use flexarm_log::{Caption, ElasticSample, RunHeader, RunResult, Sample, TwinSample};
+use flexarm_settings::Setting;
 use flexarm_stepping::Linear;
 use nalgebra::DVector;
 
 use crate::arm::Arm;
 use crate::arm::bends::stations;
 use crate::arm::options::Outputs;
-use crate::error::{Error, PoseError, ValueError};
+use crate::error::Error;
 use crate::poses::modes::{ModeModel, ModeTable, modes_of, table};
 use crate::poses::posed::Posed;
 use crate::robot::Robot;
@@ -58,16 +59,18 @@ impl Arm {
         movie: &ModeMovie,
         outputs: &Outputs,
     ) -> Result<ModeTable, Error> {
-        let within =
-            |x: f64, otherwise: fn(f64) -> ValueError| if x > 0.0 && x < 1000.0 { Ok(()) } else { Err(otherwise(x)) };
-        within(movie.seconds, ValueError::Seconds)?;
-        movie.tool_motion_m.map_or(Ok(()), |x| within(x, ValueError::ToolMotion))?;
+        let within = |x: f64, setting: Setting, unit: &str| match x > 0.0 && x < 1000.0 {
+            true => Ok(()),
+            false => Err(Error::Value(format!("{setting} must be positive and below 1000, found {x} {unit}"))),
+        };
+        within(movie.seconds, Setting::Seconds, "s")?;
+        movie.tool_motion_m.map_or(Ok(()), |x| within(x, Setting::ToolMotion, "m"))?;
         let posed = self.posed(at)?;
         let model = ModeModel::new(&posed, speeds)?;
         let linear = &model.linear;
         let all = modes_of(linear)?;
         if all.is_empty() {
-            return Err(PoseError::NoModes.into());
+            return Err(Error::Pose("the robot has no flexible link, so there are no modes to record".into()));
         }
         let shown = &all[..count.min(all.len())];
         let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));

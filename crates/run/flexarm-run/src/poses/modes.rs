@@ -13,8 +13,8 @@ use serde::Serialize;
 use crate::arm::Arm;
 use crate::arm::joint_values::joint_values;
 use crate::arm::options::Modelling;
-use crate::caveat::{self, Caveat, kinds};
-use crate::error::{Error, PoseError};
+use crate::caveat::{self, Finding, kinds};
+use crate::error::Error;
 use crate::poses::posed::{Posed, step_error};
 use crate::run::summary::Files;
 
@@ -54,7 +54,7 @@ pub struct ModeTable {
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
     /// Probable errors in the input, and limits of the result's validity.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Figures of one mode.
@@ -133,7 +133,7 @@ pub(crate) fn modes_of(linear: &Linear) -> Result<Vec<DampedMode>, Error> {
 }
 
 pub(crate) fn linear_error(error: LinearError) -> Error {
-    PoseError::Linear(error).into()
+    Error::Pose(format!("the linear model at this pose: {error}"))
 }
 
 impl Arm {
@@ -195,7 +195,7 @@ impl ModeModel {
     }
 
     /// Checks whether the rotation is steady.
-    fn caveat(&self) -> Option<Caveat> {
+    fn caveat(&self) -> Option<Finding> {
         let found = || kinds::UNSTEADY_ROTATION.found("the rotation", 100.0 * self.change, 100.0 * STEADY);
         (self.change > STEADY).then(found)
     }
@@ -212,7 +212,7 @@ fn lowest(posed: &Posed, speeds: Option<&[f64]>, count: usize) -> Result<ModeTab
 
 /// Estimates the error of the frequencies of a turning arm from those with half as many modes of
 /// its links; returns a caveat if it is large.
-fn few_modes(posed: &Posed, model: &ModeModel, frequencies_hz: &[f64]) -> Option<Caveat> {
+fn few_modes(posed: &Posed, model: &ModeModel, frequencies_hz: &[f64]) -> Option<Finding> {
     let arm = &posed.arm;
     let of_links = arm.spans.iter().filter(|span| span.lumped.is_none()).filter_map(|span| {
         let (_, range) = model.linear.elements.iter().find(|(name, _)| *name == span.link)?;
@@ -245,11 +245,11 @@ pub(crate) fn table(posed: &Posed, model: &ModeModel, all: &[DampedMode], count:
     let worst = all.iter().map(|mode| mode.residual).fold(0.0, f64::max);
     if worst > 1e-6 {
         let message = format!("a mode has a relative residual of {worst:.1e}: its figures are inaccurate");
-        caveats.push(Caveat::from_message("inexact-mode", "modes", message, ""));
+        caveats.push(Finding::warning("inexact-mode", "modes", message, ""));
     }
     if all.iter().any(|mode| mode.eigenvalue.re > 1e-9 * mode.eigenvalue.norm()) {
         let message = "a mode grows: the arm is not stable at this pose";
-        caveats.push(Caveat::from_message("unstable", "modes", message, "check the gains of the servos"));
+        caveats.push(Finding::warning("unstable", "modes", message, "check the gains of the servos"));
     }
     let modes: Vec<ModeFigures> =
         all.iter().take(count).map(|mode| ModeFigures::new(mode, model, &compliance)).collect();

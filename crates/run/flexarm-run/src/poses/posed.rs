@@ -11,8 +11,8 @@ use nalgebra::{DVector, Vector6};
 use crate::arm::Arm;
 use crate::arm::joint_values::joint_values;
 use crate::caveat::pose::ArmAtRest;
-use crate::caveat::{Caveat, kinds, of_use, once_each, validity};
-use crate::error::{Error, PoseError, ValueError};
+use crate::caveat::{Finding, kinds, of_use, once_each, validity};
+use crate::error::Error;
 use crate::motions::motion::Motion;
 use crate::robot::Robot;
 use crate::robot::balancer;
@@ -67,7 +67,7 @@ pub fn step_error(source: StepError) -> Error {
 }
 
 /// Checks a force and moment on the TCP (six values).
-pub fn check_wrench(wrench: &[f64]) -> Result<(), ValueError> {
+pub fn check_wrench(wrench: &[f64]) -> Result<(), Error> {
     let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
     let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
     Ok(force.and(torque)?)
@@ -159,21 +159,21 @@ impl Posed {
 
     /// Returns the caveats about the robot and its equilibrium under a wrench on the TCP (world
     /// axes).
-    pub fn caveats_of(&self, linear: &Linear, wrench: &[f64; 6]) -> Vec<Caveat> {
+    pub fn caveats_of(&self, linear: &Linear, wrench: &[f64; 6]) -> Vec<Finding> {
         let mut caveats = of_use::of_model(&self.arm);
         caveats.extend(of_use::at_rest(self, linear, wrench));
         once_each(caveats)
     }
 
     /// Checks whether the pose is within the joint ranges, and whether anything is elastic.
-    pub(crate) fn caveats(&self) -> Vec<Caveat> {
+    pub(crate) fn caveats(&self) -> Vec<Finding> {
         let model = &self.plant.model;
-        let mut caveats: Vec<Caveat> =
+        let mut caveats: Vec<Finding> =
             validity::outside_limits(&model.coordinates()[..model.n_actuated()], &self.at).collect();
         if self.arm.springs.is_empty() {
             let message =
                 "the robot has no flexible link and no elastic drive: it does not deflect and does not vibrate";
-            caveats.push(Caveat::from_message(
+            caveats.push(Finding::warning(
                 "nothing-yields",
                 "robot",
                 message,
@@ -209,7 +209,7 @@ impl Posed {
 
     /// Checks whether the models are valid at an equilibrium: deflections of links, torques of
     /// drives.
-    pub(crate) fn validity(&self, linear: &Linear) -> Vec<Caveat> {
+    pub(crate) fn validity(&self, linear: &Linear) -> Vec<Finding> {
         let links = self.arm.spans.iter().zip(strains(&self.arm, &self.plant, &linear.q));
         let links = links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain));
         let holding = linear.holding.as_slice();
@@ -218,7 +218,7 @@ impl Posed {
     }
 
     /// Returns the caveats about the arm at rest.
-    fn standing(&self, linear: &Linear) -> Vec<Caveat> {
+    fn standing(&self, linear: &Linear) -> Vec<Finding> {
         let moved = linear.X_WT.translation.vector - self.rigid_tool().translation.vector;
         let elastic = &linear.q.as_slice()[self.plant.model.n_actuated()..];
         let (arm, plant) = (&self.arm, &self.plant);
@@ -266,6 +266,9 @@ pub(crate) fn strains(arm: &Arm, plant: &Plant, q: &DVector<f64>) -> Vec<(f64, f
 pub(crate) fn all_finite<'a>(what: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), Error> {
     match values.into_iter().all(|x| x.is_finite()) {
         true => Ok(()),
-        false => Err(PoseError::Overflow { what: what.to_owned() }.into()),
+        false => Err(Error::Pose(format!(
+            "{what} are not finite: a mass, a length, a stiffness, a force or a joint value is far too large or too \
+             small"
+        ))),
     }
 }

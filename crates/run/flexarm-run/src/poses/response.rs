@@ -9,14 +9,15 @@ use flexarm_analysis::{
 };
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve, PlotError};
 use flexarm_files::{check_free, write_all};
+use flexarm_settings::Setting;
 use flexarm_settings::written::csv_field;
 use flexarm_stepping::Linear;
 use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::{self, Caveat, kinds};
-use crate::error::{ChannelError, Error, ValueError};
+use crate::caveat::{self, Finding, kinds};
+use crate::error::Error;
 use crate::poses::modes::{linear_error, modes_of, tool_map};
 use crate::poses::posed::Posed;
 
@@ -102,7 +103,7 @@ pub struct Response {
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
     /// Probable errors in the input, and limits of the result's validity.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Response of one output to one input.
@@ -196,7 +197,9 @@ fn response_at(posed: Posed, request: &ResponseRequest, outputs: Option<&Respons
     let channels = output_channels(&request.outputs)?;
     if !POINTS.contains(&request.points) {
         let (least, most) = (*POINTS.start(), *POINTS.end());
-        return Err(ValueError::Points { found: request.points, least, most }.into());
+        let message =
+            format!("{} must lie between {least} and {most}, found {found}", Setting::Points, found = request.points);
+        return Err(Error::Value(message));
     }
     let paths: Vec<PathBuf> = outputs.iter().flat_map(|o| RESPONSE_FILES.map(|name| o.folder.join(name))).collect();
     check_free(&paths, outputs.is_some_and(|o| o.overwrite))?;
@@ -309,10 +312,19 @@ fn range(request: &ResponseRequest, modes_hz: &[f64]) -> Result<(f64, f64), Erro
     let logarithmic = request.spacing == Spacing::Logarithmic;
     let lowest = if logarithmic { f64::MIN_POSITIVE } else { 0.0 };
     if !(from.is_finite() && from >= lowest) {
-        return Err(ValueError::LowestFrequency { found: from, logarithmic }.into());
+        let expected = match logarithmic {
+            true => format!("positive (0 needs {} linear)", Setting::Spacing),
+            false => "positive or zero".into(),
+        };
+        return Err(Error::Value(format!("{} must be {expected}, found {from} Hz", Setting::LowestFrequency)));
     }
     if !(to.is_finite() && to > from && to <= HIGHEST_HZ) {
-        return Err(ValueError::HighestFrequency { found: to, lowest: from }.into());
+        let message = format!(
+            "{} must lie above {} ({from} Hz) and below 1e6 Hz, found {to} Hz",
+            Setting::HighestFrequency,
+            Setting::LowestFrequency
+        );
+        return Err(Error::Value(message));
     }
     Ok((from, to))
 }
@@ -325,30 +337,39 @@ fn input_channels(words: &[String], posed: &Posed) -> Result<Vec<Channel>, Error
         }
         let Some(index) = posed.joints.iter().position(|j| j == word) else {
             let (word, joints) = (word.clone(), posed.joints.clone());
-            return Err(ChannelError::UnknownInput { word, forces: &WRENCH, joints });
+            return Err(Error::Value(format!(
+                "input {word:?} is not known; inputs are {forces:?} and the joints {joints:?}",
+                forces = WRENCH
+            )));
         };
         let unit = if posed.prismatic[index] { "m" } else { "rad" };
         Ok(Channel { word: word.clone(), unit, index, joint: true })
     };
-    once(words.iter().map(channel).collect::<Result<_, ChannelError>>()?, "input")
+    once(words.iter().map(channel).collect::<Result<_, Error>>()?, "input")
 }
 
 fn output_channels(words: &[String]) -> Result<Vec<Channel>, Error> {
     let channel = |word: &String| {
         let index = AXES.iter().position(|w| w == word);
-        let index = index.ok_or_else(|| ChannelError::UnknownOutput { word: word.clone(), axes: &AXES })?;
+        let index = index.ok_or_else(|| {
+            Error::Value(format!(
+                "output {word:?} is not known; outputs are {axes:?} (the folder is {})",
+                Setting::Output,
+                axes = AXES
+            ))
+        })?;
         Ok(Channel { word: word.clone(), unit: if index < 3 { "m" } else { "rad" }, index, joint: false })
     };
-    once(words.iter().map(channel).collect::<Result<_, ChannelError>>()?, "output")
+    once(words.iter().map(channel).collect::<Result<_, Error>>()?, "output")
 }
 
 fn once(channels: Vec<Channel>, side: &'static str) -> Result<Vec<Channel>, Error> {
     if channels.is_empty() {
-        return Err(ChannelError::Missing { side }.into());
+        return Err(Error::Value(format!("no {side} is given")));
     }
     for (k, channel) in channels.iter().enumerate() {
         if channels[..k].iter().any(|c| c.word == channel.word) {
-            return Err(ChannelError::Twice { side, word: channel.word.clone() }.into());
+            return Err(Error::Value(format!("{side} {word:?} is given twice", word = channel.word)));
         }
     }
     Ok(channels)

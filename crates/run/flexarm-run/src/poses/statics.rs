@@ -11,7 +11,7 @@ use nalgebra::{DVector, Matrix6xX};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::{self, Caveat, validity};
+use crate::caveat::{self, Finding, validity};
 use crate::error::Error;
 use crate::poses::posed::{Posed, all_finite};
 use crate::poses::statics_picture::{self, StaticsFiles, StaticsOutputs};
@@ -62,7 +62,7 @@ pub struct Statics {
     /// Warnings among the caveats, as sentences.
     pub warnings: Vec<String>,
     /// Probable errors in the input, and limits of the result's validity.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
 }
 
 /// An elastic element at the equilibrium.

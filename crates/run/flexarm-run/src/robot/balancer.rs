@@ -5,11 +5,12 @@ use flexarm_kinematics::{
     Balancer, BalancerLaw, BalancerPlace, BalancerSpan, Data, Frame, Joint, JointKind, Link, Mechanism, Model,
     PlacedBalancer, Pose, forward_kinematics, frame_jacobian,
 };
+use flexarm_settings::known_names;
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Matrix6xX, Rotation3, Vector3};
 use serde::Serialize;
 
-use crate::error::BalancerError;
+use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot::entry_checks::loop_of_joint;
 
@@ -69,30 +70,39 @@ impl Robot {
     /// Adds a balancer to the robot.
     ///
     /// # Errors
-    /// [`BalancerError`] for unknown links and joints, two ends that do not move relative to each
+    /// [`Error::Modelling`] for unknown links and joints, two ends that do not move relative to each
     /// other, values that are not finite, and a duplicate name.
-    pub fn with_balancer(mut self, balancer: RobotBalancer) -> Result<Self, BalancerError> {
+    pub fn with_balancer(mut self, balancer: RobotBalancer) -> Result<Self, Error> {
         self.add_balancer(balancer)?;
         Ok(self)
     }
 
-    pub(crate) fn add_balancer(&mut self, balancer: RobotBalancer) -> Result<(), BalancerError> {
+    pub(crate) fn add_balancer(&mut self, balancer: RobotBalancer) -> Result<(), Error> {
         let RobotBalancer { name, ends, law } = balancer;
         if self.rigid.balancers.iter().any(|other| other.name == name) {
-            return Err(BalancerError::Twice { name });
+            return Err(Error::Modelling(format!("balancer {name:?} is defined twice: names must be unique")));
         }
         let span = match ends {
             BalancerEnds::Joint(joint) => {
                 let moves = |j: &&Joint| j.kind.axis_motion().is_some() && !j.kind.is_elastic();
                 let Some(found) = self.rigid.joints.iter().filter(moves).find(|j| j.name == joint) else {
-                    let known = self.rigid.joints.iter().filter(moves).map(|j| j.name.clone()).collect();
-                    return Err(BalancerError::UnknownJoint { name, joint, known });
+                    let known: Vec<_> = self.rigid.joints.iter().filter(moves).map(|j| j.name.clone()).collect();
+                    return Err(Error::Modelling(format!(
+                        "balancer {name:?}: the robot has no movable joint {joint:?}; it has {}",
+                        known_names(&joint, &known)
+                    )));
                 };
                 if let Some(own) = loop_of_joint(&self.rigid, &joint) {
-                    return Err(BalancerError::Dependent { name, joint, own: own.to_owned() });
+                    return Err(Error::Modelling(format!(
+                        "balancer {name:?}: joint {joint:?} follows from a loop, {own:?}: give its two ends, from \
+                         and to, instead"
+                    )));
                 }
                 if matches!(law, BalancerLaw::Sine { .. }) && found.kind.slides() {
-                    return Err(BalancerError::Slides { name, joint });
+                    return Err(Error::Modelling(format!(
+                        "balancer {name:?}: a sine is a torque over an angle, but joint {joint:?} slides: use spring \
+                         or curve"
+                    )));
                 }
                 BalancerSpan::Joint { joint, child: found.child.clone() }
             }
@@ -104,20 +114,30 @@ impl Robot {
 
     /// Adds frames for the two ends. They are fixed to their links, so that on a flexible link each
     /// moves with the part it is on.
-    fn line(&mut self, name: &str, ends: &[(String, [f64; 3]); 2]) -> Result<BalancerSpan, BalancerError> {
+    fn line(&mut self, name: &str, ends: &[(String, [f64; 3]); 2]) -> Result<BalancerSpan, Error> {
         let name = name.to_owned();
         for (link, p) in ends {
             if self.rigid.link(link).is_none() {
-                let known = self.rigid.links.iter().map(|l| l.name.clone()).filter(|l| !l.starts_with("__")).collect();
-                return Err(BalancerError::UnknownLink { name, link: link.clone(), known });
+                let known: Vec<_> =
+                    self.rigid.links.iter().map(|l| l.name.clone()).filter(|l| !l.starts_with("__")).collect();
+                return Err(Error::Modelling(format!(
+                    "balancer {name:?}: {link:?} is not a link of the robot; its links are {}",
+                    known_names(link, &known)
+                )));
             }
             if let Some(value) = p.iter().find(|x| !x.is_finite()) {
-                return Err(BalancerError::NotFinite { name, link: link.clone(), value: *value });
+                return Err(Error::Modelling(format!(
+                    "balancer {name:?}: its point on link {link:?} has the entry {value}, expected finite numbers in \
+                     m"
+                )));
             }
         }
         let [first, second] = [0, 1].map(|k| ends[k].0.clone());
         if carrier(&self.rigid, &first) == carrier(&self.rigid, &second) {
-            return Err(BalancerError::SameBody { name, first, second });
+            return Err(Error::Modelling(format!(
+                "balancer {name:?}: no joint moves link {second:?} against link {first:?}, so it does nothing: put \
+                 its ends on links with a joint between them"
+            )));
         }
         let frames = ["from", "to"].map(|end| format!("__balancer_{name}_{end}"));
         for ((link, p), frame) in ends.iter().zip(&frames) {
@@ -184,8 +204,8 @@ fn torques(model: &Model, data: &Data, balancer: &PlacedBalancer, length: f64) -
 /// Checks that every balancer is within its range at these joint values (rad or m).
 ///
 /// # Errors
-/// [`BalancerError::NoRoom`] and [`BalancerError::NoLength`], for the first balancer that is not.
-pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), BalancerError> {
+/// [`Error::Modelling`] for the first balancer that is not.
+pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), Error> {
     if model.balancers().is_empty() {
         return Ok(());
     }
@@ -196,12 +216,20 @@ pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Re
         match &balancer.law {
             BalancerLaw::Gas(gas) if gas.volume_ratio(length) <= 0.0 => {
                 let beyond = if gas.pulls { "above" } else { "below" };
-                return Err(BalancerError::NoRoom { name, length, beyond, end: gas.end() });
+                let message = format!(
+                    "balancer {name:?} is {length:.4} m long there, its gas has no room left {beyond} {end:.4} m: \
+                     check its ends (m), volume (m³), area (m²) and the length to which these belong",
+                    end = gas.end()
+                );
+                return Err(Error::Modelling(message));
             }
             law => {
                 let line = matches!(balancer.place, BalancerPlace::Points(_));
                 if line && length == 0.0 && law.tension(length) != 0.0 {
-                    return Err(BalancerError::NoLength { name });
+                    return Err(Error::Modelling(format!(
+                        "both ends of balancer {name:?} are at the same place there, so that its force has no \
+                         direction: move an end"
+                    )));
                 }
             }
         }
@@ -215,8 +243,8 @@ const TIMES: usize = 1000;
 /// As [`check_pose`], along a motion of the rigid robot.
 ///
 /// # Errors
-/// [`BalancerError::AlongMotion`].
-pub(crate) fn check_motion(model: &Model, trajectory: &Trajectory) -> Result<(), BalancerError> {
+/// [`Error::Modelling`].
+pub(crate) fn check_motion(model: &Model, trajectory: &Trajectory) -> Result<(), Error> {
     if model.balancers().is_empty() {
         return Ok(());
     }
@@ -225,8 +253,7 @@ pub(crate) fn check_motion(model: &Model, trajectory: &Trajectory) -> Result<(),
     for i in 0..=TIMES {
         let t = trajectory.duration() * i as f64 / TIMES as f64;
         trajectory.sample(t, q.as_mut_slice(), &mut v, &mut a);
-        check_pose(model, &mut data, &q)
-            .map_err(|source| BalancerError::AlongMotion { t, source: Box::new(source) })?;
+        check_pose(model, &mut data, &q).map_err(|source| Error::Modelling(format!("at t = {t:.3} s: {source}")))?;
     }
     Ok(())
 }

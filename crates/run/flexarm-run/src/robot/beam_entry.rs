@@ -2,7 +2,7 @@
 //!
 //! [`Section::SHAPES`] lists the lengths that each shape takes.
 
-use flexarm_fem::{Bar, BeamTheory, FemError, Material, Section};
+use flexarm_fem::{Bar, BeamTheory, Material, Section};
 use flexarm_linkmaker::MaterialEntry;
 use serde::Deserialize;
 
@@ -82,23 +82,6 @@ fn half() -> f64 {
 pub(crate) const GIVEN: &str = "given";
 const GIVEN_KEYS: &[&str] = &["EA", "EI_y", "EI_z", "GJ", "kGA_y", "kGA_z", "mass_per_length", "rotary_y", "rotary_z"];
 
-/// Reason why an entry is no beam.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum BeamEntryError {
-    #[error("section {section:?} needs {key}")]
-    MissingKey { section: String, key: &'static str },
-    #[error("section {section:?} does not take {key}; it takes {taken:?}")]
-    StrayKey { section: String, key: &'static str, taken: &'static [&'static str] },
-    #[error("section {section:?} is not known; use {} or {}", shapes(), GIVEN)]
-    UnknownSection { section: String },
-    #[error("material is missing: a name such as \"steel\" or {{ E = ..., nu = ..., rho = ... }}")]
-    NoMaterial,
-    #[error(transparent)]
-    Material(#[from] FemError),
-    #[error("theory {theory:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")]
-    UnknownTheory { theory: String },
-}
-
 fn shapes() -> String {
     Section::SHAPES.iter().map(|(word, _)| *word).collect::<Vec<_>>().join(", ")
 }
@@ -131,38 +114,38 @@ impl BeamEntry {
         self.section_numbers().into_iter().find(|(name, _)| *name == key).and_then(|(_, value)| value)
     }
 
-    fn needed(&self, key: &'static str) -> Result<f64, BeamEntryError> {
-        self.number(key).ok_or_else(|| BeamEntryError::MissingKey { section: self.section.clone(), key })
+    fn needed(&self, key: &'static str) -> Result<f64, String> {
+        self.number(key).ok_or_else(|| format!("section {section:?} needs {key}", section = self.section))
     }
 
-    pub(crate) fn theory(&self) -> Result<BeamTheory, BeamEntryError> {
+    pub(crate) fn theory(&self) -> Result<BeamTheory, String> {
         match self.theory.as_deref() {
             None | Some("timoshenko") => Ok(BeamTheory::Timoshenko),
             Some("euler-bernoulli") => Ok(BeamTheory::EulerBernoulli),
-            Some(other) => Err(BeamEntryError::UnknownTheory { theory: other.to_owned() }),
+            Some(other) => Err(format!("theory {other:?} is not known; use \"timoshenko\" or \"euler-bernoulli\"")),
         }
     }
 }
 
 /// Builds section and material; messages name missing and superfluous keys.
-pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), BeamEntryError> {
+pub(crate) fn beam_section(beam: &BeamEntry) -> Result<(Section, Material), String> {
     let material = match &beam.material {
-        Some(MaterialEntry::Named(name)) => Material::named(name)?,
+        Some(MaterialEntry::Named(name)) => Material::named(name).map_err(|error| error.to_string())?,
         Some(MaterialEntry::Given(m)) => Material::isotropic(m.young, m.nu, m.rho),
         // A given section contains its own stiffness.
         None if beam.section == GIVEN => Material::STEEL,
-        None => return Err(BeamEntryError::NoMaterial),
+        None => return Err("material is missing: a name such as \"steel\" or { E = ..., nu = ..., rho = ... }".into()),
     };
     let (section, taken) = section(beam)?;
     let stray = |(key, value): &(&'static str, Option<f64>)| value.is_some() && !taken.contains(key);
     if let Some((key, _)) = beam.section_numbers().into_iter().find(stray) {
-        return Err(BeamEntryError::StrayKey { section: beam.section.clone(), key, taken });
+        return Err(format!("section {section:?} does not take {key}; it takes {taken:?}", section = beam.section));
     }
     Ok((section, material))
 }
 
 /// Builds the section, and returns the keys that it takes.
-fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), BeamEntryError> {
+fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), String> {
     if beam.section == GIVEN {
         let bar = Bar {
             EA: beam.needed("EA")?,
@@ -181,8 +164,9 @@ fn section(beam: &BeamEntry) -> Result<(Section, &'static [&'static str]), BeamE
         default.map_or_else(|| beam.needed(key), |d| Ok(beam.number(key).unwrap_or(d)))
     };
     let shape = Section::SHAPES.iter().find(|(word, _)| *word == beam.section);
-    match (Section::from_lengths(&beam.section, length)?, shape) {
+    let found = Section::from_lengths(&beam.section, length).map_err(|error| error.to_string())?;
+    match (found, shape) {
         (Some(section), Some((_, keys))) => Ok((section, keys)),
-        _ => Err(BeamEntryError::UnknownSection { section: beam.section.clone() }),
+        _ => Err(format!("section {section:?} is not known; use {} or {}", shapes(), GIVEN, section = beam.section)),
     }
 }

@@ -99,45 +99,40 @@ fn couple_rotors(robot: &mut Robot, joints: &[String], C_inverse: &DMatrix<f64>)
     }
 }
 
-/// Drives that a coupling does not support.
-#[derive(Debug, thiserror::Error)]
-enum CoupledDriveError {
-    #[error(
-        "each of its joints needs a [[drive]] of the same kind with a gearbox, or none has a gearbox: a rigid gear \
-         among elastic ones leaves no springs on the joints"
-    )]
-    Mixed,
-    #[error("the gearbox of joint {joint:?} needs one stiffness, without backlash and curve")]
-    Stiffness { joint: String },
-    #[error(
-        "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not support"
-    )]
-    GearLaws { joint: String },
-    #[error("the friction of joint {joint:?} grows with its load, which coupled gears do not support")]
-    LoadFriction { joint: String },
-}
-
 /// Checks that the drives of coupled joints are supported by a coupling.
-fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), CoupledDriveError> {
+fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
     let drives: Vec<Option<&Drive>> =
         joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name)).collect();
     let yields = |drive: &Option<&Drive>| drive.is_some_and(|d| d.gearbox.is_some());
     let kinds: Vec<_> = drives.iter().map(|d| d.map(|d| d.kind)).collect();
     if drives.iter().any(yields) && (!drives.iter().all(yields) || kinds.windows(2).any(|pair| pair[0] != pair[1])) {
-        return Err(CoupledDriveError::Mixed);
+        return Err("each of its joints needs a [[drive]] of the same kind with a gearbox, or none has a gearbox: a \
+                    rigid gear among elastic ones leaves no springs on the joints"
+            .into());
     }
     for drive in drives.iter().flatten() {
         let joint = || drive.joint.clone();
         let Some((gearbox, gear)) = &drive.gearbox else { continue };
         if !matches!(gearbox.stiffness, GearStiffness::Axis(_)) || !gear.curves.is_empty() {
-            return Err(CoupledDriveError::Stiffness { joint: joint() });
+            return Err(format!(
+                "the gearbox of joint {joint:?} needs one stiffness, without backlash and curve",
+                joint = joint()
+            ));
         }
         if gear.hysteresis.is_some() || !gear.transmission.is_empty() {
-            return Err(CoupledDriveError::GearLaws { joint: joint() });
+            let message = format!(
+                "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not \
+                 support",
+                joint = joint()
+            );
+            return Err(message);
         }
     }
     match drives.iter().flatten().find(|d| d.load_friction > 0.0) {
-        Some(drive) => Err(CoupledDriveError::LoadFriction { joint: drive.joint.clone() }),
+        Some(drive) => Err(format!(
+            "the friction of joint {joint:?} grows with its load, which coupled gears do not support",
+            joint = drive.joint
+        )),
         None => Ok(()),
     }
 }

@@ -11,7 +11,7 @@ use toml::Spanned;
 use super::load::LoadOptions;
 use super::{PAYLOAD_LINK, Robot};
 use crate::body_change::BodyChange;
-use crate::caveat::Caveat;
+use crate::caveat::Finding;
 use crate::error::Error;
 use crate::robot::entry_checks::{check_finite, loop_of_joint, pose};
 use crate::robot::link_entry::FlexibleLinkEntry;
@@ -91,7 +91,7 @@ impl Robot {
         }
         if mass == 0.0 {
             let help = "leave the payload out if there is none";
-            let none = Caveat::from_message("no-payload", "the payload", "the payload has 0 kg: it is ignored", help);
+            let none = Finding::warning("no-payload", "the payload", "the payload has 0 kg: it is ignored", help);
             self.written.push(none.as_note());
             return Ok(());
         }

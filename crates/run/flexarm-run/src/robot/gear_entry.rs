@@ -2,7 +2,7 @@
 //! effects of a robot.
 
 use flexarm_stepping::{
-    CurveError, GearCoupling, Harmonic, Hysteresis, LoadFriction, Plant, StepError, TorqueCurve, TransmissionError,
+    GearCoupling, Harmonic, Hysteresis, LoadFriction, Plant, StepError, TorqueCurve, TransmissionError,
 };
 use nalgebra::DMatrix;
 use serde::Deserialize;
@@ -77,75 +77,17 @@ pub struct GearHysteresis {
     pub loss: f64,
 }
 
-/// Reason why an angle of a gear is not read.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum AngleError {
-    #[error("{0} and {1} are both given: keep one of them")]
-    Twice(&'static str, &'static str),
-    #[error("{key} is {found}, expected a positive number")]
-    NotPositive { key: &'static str, found: f64 },
-}
-
-/// Reason why an entry is no transmission error.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum TransmissionEntryError {
-    #[error("transmission_error {0}")]
-    Amplitude(#[from] AngleError),
-    #[error("transmission_error needs amplitude (rad) or amplitude_arcsec")]
-    NoAmplitude,
-    #[error("transmission_error per_motor_turn needs the ratio of the drive")]
-    NoRatio,
-    #[error("transmission_error needs one of per_motor_turn and per_joint_turn")]
-    NoCycles,
-    #[error(
-        "transmission_error has {cycles} cycles in a turn of the joint and phase {phase}: expected positive and \
-         finite numbers"
-    )]
-    Values { cycles: f64, phase: f64 },
-}
-
-/// Reason why an entry is no hysteresis.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum HysteresisEntryError {
-    #[error("hysteresis {0}")]
-    Angle(#[from] AngleError),
-    #[error("hysteresis needs loss (rad) or loss_arcmin: the width of its loop without torque")]
-    NoLoss,
-    #[error("hysteresis with lost_motion takes a stiffness, not backlash or a curve, which say the same")]
-    LostMotionOfCurve,
-    #[error("hysteresis needs the rated_torque (N m) to which its lost_motion belongs")]
-    NoRatedTorque,
-    #[error("hysteresis has rated_torque {0}, expected a positive torque in N m")]
-    RatedTorque(f64),
-    #[error(
-        "hysteresis has a lost motion of {lost:e} rad, less than the {elastic:e} rad of elastic deflection at 3 % of \
-         the rated torque to either side: check both, or leave lost_motion out"
-    )]
-    LostMotion { lost: f64, elastic: f64 },
-    #[error("hysteresis: {0}")]
-    Curve(#[from] CurveError),
-    #[error(
-        "hysteresis has a loss of {loss:e} rad within the play, where no torque holds the gear back: give a larger \
-         loss, or less backlash"
-    )]
-    LossWithinPlay { loss: f64 },
-    #[error("hysteresis has reach {0}, expected a positive deflection in rad")]
-    Reach(f64),
-    #[error("hysteresis has {0} sliders, expected 1 to {most}", most = MAX_SLIDERS)]
-    Sliders(i64),
-}
-
 /// Reads a value in rad, or in another unit under another key; at most one may be given.
-fn one_of(keys: [(&'static str, Option<f64>); 2], unit: f64) -> Result<Option<f64>, AngleError> {
+fn one_of(keys: [(&'static str, Option<f64>); 2], unit: f64) -> Result<Option<f64>, String> {
     let [(own, value), (other, scaled)] = keys;
     let found = match (value, scaled) {
-        (Some(_), Some(_)) => return Err(AngleError::Twice(own, other)),
+        (Some(_), Some(_)) => return Err(format!("{own} and {other} are both given: keep one of them")),
         (Some(x), None) => Some((own, x, x)),
         (None, Some(x)) => Some((other, x, x * unit)),
         (None, None) => None,
     };
     match found {
-        Some((key, x, _)) if !(x.is_finite() && x > 0.0) => Err(AngleError::NotPositive { key, found: x }),
+        Some((key, x, _)) if !(x.is_finite() && x > 0.0) => Err(format!("{key} is {x}, expected a positive number")),
         found => Ok(found.map(|(_, _, value)| value)),
     }
 }
@@ -153,22 +95,26 @@ fn one_of(keys: [(&'static str, Option<f64>); 2], unit: f64) -> Result<Option<f6
 /// Reads the harmonics of a gear whose motor makes `ratio` turns per turn of the joint.
 ///
 /// # Errors
-/// [`TransmissionEntryError`] for a missing or invalid value.
-pub(crate) fn harmonics(
-    entries: &[HarmonicEntry],
-    ratio: Option<f64>,
-) -> Result<Vec<Harmonic>, TransmissionEntryError> {
+/// A sentence with the remedy for a missing or invalid value.
+pub(crate) fn harmonics(entries: &[HarmonicEntry], ratio: Option<f64>) -> Result<Vec<Harmonic>, String> {
     let harmonic = |entry: &HarmonicEntry| {
         let keys = [("amplitude", entry.amplitude), ("amplitude_arcsec", entry.amplitude_arcsec)];
-        let amplitude = one_of(keys, ARCSEC)?.ok_or(TransmissionEntryError::NoAmplitude)?;
+        let amplitude = one_of(keys, ARCSEC)?.ok_or("transmission_error needs amplitude (rad) or amplitude_arcsec")?;
         let cycles = match (entry.per_motor_turn, entry.per_joint_turn, ratio) {
             (Some(n), None, Some(ratio)) => n * ratio.abs(),
-            (Some(_), None, None) => return Err(TransmissionEntryError::NoRatio),
+            (Some(_), None, None) => {
+                return Err("transmission_error per_motor_turn needs the ratio of the drive".into());
+            }
             (None, Some(n), _) => n,
-            _ => return Err(TransmissionEntryError::NoCycles),
+            _ => return Err("transmission_error needs one of per_motor_turn and per_joint_turn".into()),
         };
         if !(cycles.is_finite() && cycles > 0.0 && entry.phase.is_finite()) {
-            return Err(TransmissionEntryError::Values { cycles, phase: entry.phase });
+            let message = format!(
+                "transmission_error has {cycles} cycles in a turn of the joint and phase {phase}: expected positive \
+                 and finite numbers",
+                phase = entry.phase
+            );
+            return Err(message);
         }
         Ok(Harmonic { amplitude, cycles, phase: entry.phase })
     };
@@ -181,26 +127,35 @@ pub(crate) fn harmonics(
 /// all sliders slipping, the branches of the loop cross zero torque there.
 ///
 /// # Errors
-/// [`HysteresisEntryError`] for a value that is missing, invalid or inconsistent with the stiffness.
+/// A sentence with the remedy for a value that is missing, invalid or inconsistent with the stiffness.
 pub(crate) fn hysteresis(
     entry: &HysteresisEntry,
     stiffness: f64,
     curve: Option<&TorqueCurve>,
-) -> Result<GearHysteresis, HysteresisEntryError> {
+) -> Result<GearHysteresis, String> {
     let loss = one_of([("loss", entry.loss), ("loss_arcmin", entry.loss_arcmin)], ARCMIN)?;
-    let loss = loss.ok_or(HysteresisEntryError::NoLoss)?;
+    let loss = loss.ok_or("hysteresis needs loss (rad) or loss_arcmin: the width of its loop without torque")?;
     let lost_motion =
         one_of([("lost_motion", entry.lost_motion), ("lost_motion_arcmin", entry.lost_motion_arcmin)], ARCMIN)?;
     let elastic = match (curve, lost_motion, entry.rated_torque) {
-        (Some(_), Some(_), _) => return Err(HysteresisEntryError::LostMotionOfCurve),
-        (None, Some(_), None) => return Err(HysteresisEntryError::NoRatedTorque),
+        (Some(_), Some(_), _) => {
+            return Err("hysteresis with lost_motion takes a stiffness: backlash and a curve say the same".into());
+        }
+        (None, Some(_), None) => {
+            return Err("hysteresis needs the rated_torque (N m) to which its lost_motion belongs".into());
+        }
         (_, _, Some(rated)) if !(rated.is_finite() && rated > 0.0) => {
-            return Err(HysteresisEntryError::RatedTorque(rated));
+            return Err(format!("hysteresis has rated_torque {rated}, expected a positive torque in N m"));
         }
         (None, Some(lost), Some(rated)) => {
             let (torque, half) = (LOST_MOTION_AT * rated, 0.5 * lost);
             if half <= torque / stiffness {
-                return Err(HysteresisEntryError::LostMotion { lost, elastic: 2.0 * torque / stiffness });
+                let message = format!(
+                    "hysteresis has a lost motion of {lost:e} rad, less than the {elastic:e} rad of elastic \
+                     deflection at 3 % of the rated torque to either side: check both, or leave lost_motion out",
+                    elastic = 2.0 * torque / stiffness
+                );
+                return Err(message);
             }
             // On either branch of the loop the elastic part is offset by half the loop width. It
             // must be soft up to that offset plus half the lost motion, so that the middle line
@@ -208,24 +163,28 @@ pub(crate) fn hysteresis(
             let (slope, soft) = (torque / half, half + 0.5 * loss);
             let (edge, far) = (slope * soft, soft + 1.0);
             let end = edge + stiffness;
-            TorqueCurve::new(&[[-far, -end], [-soft, -edge], [0.0, 0.0], [soft, edge], [far, end]])?
+            TorqueCurve::new(&[[-far, -end], [-soft, -edge], [0.0, 0.0], [soft, edge], [far, end]])
+                .map_err(|error| error.to_string())?
         }
         (Some(curve), None, _) => curve.clone(),
         (None, None, _) => TorqueCurve::straight(stiffness),
     };
     let friction = elastic.torque(0.5 * loss);
     if friction <= 0.0 {
-        return Err(HysteresisEntryError::LossWithinPlay { loss });
+        return Err(format!(
+            "hysteresis has a loss of {loss:e} rad within the play, where no torque holds the gear back: give a \
+             larger loss, or less backlash"
+        ));
     }
     let reach = match entry.reach {
         None => 0.5 * loss,
         Some(reach) if reach.is_finite() && reach > 0.0 => reach,
-        Some(reach) => return Err(HysteresisEntryError::Reach(reach)),
+        Some(reach) => return Err(format!("hysteresis has reach {reach}, expected a positive deflection in rad")),
     };
     let sliders = match entry.sliders {
         None => SLIDERS,
         Some(n) if (1..=MAX_SLIDERS).contains(&n) => n as usize,
-        Some(n) => return Err(HysteresisEntryError::Sliders(n)),
+        Some(n) => return Err(format!("hysteresis has {n} sliders, expected 1 to {MAX_SLIDERS}")),
     };
     let sliders = Hysteresis::even_sliders(friction, reach, sliders);
     Ok(GearHysteresis { law: Hysteresis { elastic, sliders }, loss })

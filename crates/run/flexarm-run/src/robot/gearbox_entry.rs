@@ -166,36 +166,25 @@ fn points_of(gear: &GearboxEntry, at: GearboxFault<'_>) -> Result<Option<TorqueC
     }
 }
 
-/// Reason why numbers are not the play of springs.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum PlayError {
-    /// The springs are coupled.
-    #[error("backlash needs uncoupled springs: stiffness of single numbers, not a 6x6 matrix")]
-    Coupled,
-    /// Their number is not that of the springs.
-    #[error(
-        "backlash has a length of {found}, the stiffness of {expected}: give the play to each side of every spring"
-    )]
-    Count { found: usize, expected: usize },
-    /// A number is negative or not finite.
-    #[error("backlash = {0}: it must be 0 or above")]
-    Negative(f64),
-}
-
 /// Reads the play of `springs` springs, `None` if they are coupled; empty if there is none.
-pub(crate) fn play_of(given: Option<&Numbers>, springs: Option<usize>) -> Result<Vec<f64>, PlayError> {
+pub(crate) fn play_of(given: Option<&Numbers>, springs: Option<usize>) -> Result<Vec<f64>, String> {
     let play: &[f64] = match given {
         None => return Ok(Vec::new()),
         Some(Numbers::One(play)) => std::slice::from_ref(play),
         Some(Numbers::Many(play)) => play,
         Some(Numbers::Matrix(_)) => &[],
     };
-    let expected = springs.ok_or(PlayError::Coupled)?;
+    let expected = springs.ok_or("backlash needs uncoupled springs: stiffness of single numbers, not a 6x6 matrix")?;
     if play.len() != expected {
-        return Err(PlayError::Count { found: play.len(), expected });
+        let message = format!(
+            "backlash has a length of {found}, the stiffness of {expected}: give the play to each side of every \
+             spring",
+            found = play.len()
+        );
+        return Err(message);
     }
     match play.iter().find(|play| !(play.is_finite() && **play >= 0.0)) {
-        Some(wrong) => Err(PlayError::Negative(*wrong)),
+        Some(wrong) => Err(format!("backlash = {wrong}: it must be 0 or above")),
         None if play.iter().all(|play| *play == 0.0) => Ok(Vec::new()),
         None => Ok(play.to_vec()),
     }

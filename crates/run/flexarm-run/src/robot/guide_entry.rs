@@ -60,37 +60,14 @@ pub struct GuideTilt {
     pub play: Option<Play>,
 }
 
-/// Reason why an entry is no guide of a joint.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum GuideEntryError {
-    #[error("guide is for a prismatic joint, whose tubes slide in each other")]
-    NotPrismatic,
-    #[error(
-        "guide: at joint position {position} m the tubes overlap by {overlap:.4} m, expected more than 0 within the \
-         limits of the joint: overlap = outer_end - inner_end - position"
-    )]
-    NoOverlap { position: f64, overlap: f64 },
-    #[error(
-        "guide.{axis}.play: gap = {gap} m and width = {width} N m, expected a gap of at least 0 and a width above 0"
-    )]
-    Play { axis: char, gap: f64, width: f64 },
-    #[error(
-        "guide.{axis}.compliance: {found:.3e} rad per N m at an overlap of {overlap:.4} m, expected more than 0 within \
-         the limits of the joint: [c0, c1, c2] of c0 + c1/overlap + c2/overlap²"
-    )]
-    Compliance { axis: char, found: f64, overlap: f64 },
-    #[error("guide needs x, y or z = {{ compliance = [c0, c1, c2] }}, a tilt about an axis")]
-    NoTilt,
-}
-
 impl GuideEntry {
     /// Checks the entry for a joint; returns its tubes and the tilts about their axes.
     ///
     /// # Errors
-    /// [`GuideEntryError`] with the key, the number found and the remedy.
-    pub(crate) fn checked(&self, joint: &Joint) -> Result<(GuideTubes, Vec<GuideTilt>), GuideEntryError> {
+    /// A sentence with the remedy with the key, the number found and the remedy.
+    pub(crate) fn checked(&self, joint: &Joint) -> Result<(GuideTubes, Vec<GuideTilt>), String> {
         if !matches!(joint.kind, JointKind::Prismatic(_)) {
-            return Err(GuideEntryError::NotPrismatic);
+            return Err("guide is for a prismatic joint, whose tubes slide in each other".into());
         }
         let entries = [('x', &self.x), ('y', &self.y), ('z', &self.z)];
         let tubes = GuideTubes {
@@ -100,7 +77,10 @@ impl GuideEntry {
         };
         let overlaps = overlaps(&tubes, &joint.limits);
         if let Some(&(position, overlap)) = overlaps.iter().find(|(_, overlap)| *overlap <= 0.0) {
-            return Err(GuideEntryError::NoOverlap { position, overlap });
+            return Err(format!(
+                "guide: at joint position {position} m the tubes overlap by {overlap:.4} m, expected more than 0 \
+                 within the limits of the joint: overlap = outer_end - inner_end - position"
+            ));
         }
         let mut tilts = Vec::new();
         for (axis, entry) in entries {
@@ -109,15 +89,21 @@ impl GuideEntry {
             if let Some(Play { gap, centre, width }) = play
                 && !(gap >= 0.0 && width > 0.0 && centre.is_finite())
             {
-                return Err(GuideEntryError::Play { axis, gap, width });
+                return Err(format!(
+                    "guide.{axis}.play: gap = {gap} m and width = {width} N m, expected a gap of at least 0 and a \
+                     width above 0"
+                ));
             }
             if let Some((overlap, found)) = least_compliance(compliance, &overlaps).filter(|(_, found)| *found <= 0.0) {
-                return Err(GuideEntryError::Compliance { axis, found, overlap });
+                return Err(format!(
+                    "guide.{axis}.compliance: {found:.3e} rad per N m at an overlap of {overlap:.4} m, expected more \
+                     than 0 within the limits of the joint: [c0, c1, c2] of c0 + c1/overlap + c2/overlap²"
+                ));
             }
             tilts.push(GuideTilt { axis, compliance: *compliance, play: play.filter(|play| play.gap > 0.0) });
         }
         match tilts.is_empty() {
-            true => Err(GuideEntryError::NoTilt),
+            true => Err("guide needs x, y or z = { compliance = [c0, c1, c2] }, a tilt about an axis".into()),
             false => Ok((tubes, tilts)),
         }
     }

@@ -12,7 +12,7 @@ use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
 use super::{Robot, TCP_FRAME, finding_text};
 use crate::arm::Arm;
 use crate::arm::options::Modelling;
-use crate::caveat::{Caveat, parts};
+use crate::caveat::{Finding, parts};
 use crate::error::Error;
 use crate::ranges::not_finite;
 use crate::robot::balancer_entry::add_balancers;
@@ -359,7 +359,7 @@ fn argument_text(name: &str, value: &Spanned<toml::Value>, source: &Source) -> R
 
 /// Returns caveats about angles as written and about unused materials, which only the text of the
 /// file shows.
-fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
+fn written_caveats(file: &RobotFile) -> Vec<Finding> {
     let rpy = file.tcp.as_ref().and_then(|tcp| parts::angles("rpy of the TCP", &tcp.get_ref().rpy));
     let beams = file.flexible_link.iter().filter_map(|link| {
         let roll = link.beam.as_ref()?.get_ref().roll;
@@ -371,7 +371,7 @@ fn written_caveats(file: &RobotFile) -> Vec<Caveat> {
     let unused = unused.map(|link| {
         let name = link.link.get_ref();
         let message = format!("the material of link {name:?} has no effect: its section is given by its stiffness");
-        Caveat::from_message("no-effect", format!("link {name:?}"), message, "leave it out").as_note()
+        Finding::warning("no-effect", format!("link {name:?}"), message, "leave it out").as_note()
     });
     rpy.into_iter().chain(beams).chain(unused).collect()
 }

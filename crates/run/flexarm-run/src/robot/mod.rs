@@ -37,8 +37,8 @@ use flexarm_stepping::{Damping, Plant};
 use flexarm_urdf::UrdfRobot;
 
 use crate::arm::options::Modelling;
-use crate::caveat::{self, Caveat};
-use crate::error::{Error, ValueError};
+use crate::caveat::{self, Finding};
+use crate::error::Error;
 use crate::robot::calibration_entry::Calibration;
 use crate::robot::controller_entry::RobotAxis;
 use crate::robot::drive_entry::Drive;
@@ -93,7 +93,7 @@ pub struct Robot {
     /// Strain gauges and stress points.
     pub gauges: Vec<Gauge>,
     /// Caveats that can only be found in the text of the file.
-    written: Vec<Caveat>,
+    written: Vec<Finding>,
 }
 
 impl Robot {
@@ -124,7 +124,7 @@ impl Robot {
         }
         let place = X_LT.translation.vector;
         if let Some(found) = place.iter().chain(X_LT.rotation.matrix().iter()).find(|x| !x.is_finite()) {
-            return Err(ValueError::NotFinite { what: "the pose of the TCP", found: *found }.into());
+            return Err(Error::not_finite("the pose of the TCP", *found));
         }
         for joint in self.rigid.joints.iter_mut().filter(|joint| joint.child == TCP_FRAME) {
             (joint.parent, joint.X_PJ) = (link.to_owned(), X_LT);
@@ -177,16 +177,14 @@ impl Robot {
     }
 
     /// Returns the caveats that are known before any computation.
-    pub fn caveats(&self) -> Vec<Caveat> {
+    pub fn caveats(&self) -> Vec<Finding> {
         let file = self.path.display().to_string();
         let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == finding_text(w));
         let own = self.warnings.iter().filter(|text| !of_urdf(text));
-        let own = own.map(|text| Caveat::from_message("flexible-link", &file, text, "compare both sources"));
-        let of_description = |caveat| Caveat { of_description: true, ..caveat };
+        let own = own.map(|text| Finding::warning("flexible-link", &file, text, "compare both sources"));
         let urdf =
-            self.urdf.warnings_only().map(|w| Caveat::from_message(w.code, &w.location, finding_text(w), &w.help));
-        let urdf = urdf.map(of_description);
-        let mut caveats: Vec<Caveat> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
+            self.urdf.warnings_only().map(|w| Finding { message: finding_text(w), of_description: true, ..w.clone() });
+        let mut caveats: Vec<Finding> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
         caveats.extend(caveat::parts::of_robot(self));
         let inertia = |link: &RobotLink| self.urdf.mechanism.link(&link.flexible.link).and_then(|own| own.inertia);
         caveats
@@ -217,6 +215,6 @@ pub fn tcp_frame(model: &Model) -> Frame {
 }
 
 /// Formats a finding with its location as a sentence.
-fn finding_text(finding: &flexarm_urdf::Finding) -> String {
+fn finding_text(finding: &Finding) -> String {
     format!("{}: {}", finding.location, finding.message)
 }

@@ -7,11 +7,12 @@ use flexarm_fem::stress::StressFields;
 use flexarm_fem::{BeamLink, FemError, ModalLink, ModalOptions};
 use flexarm_flexlink::{FlexibleLink, LinkForm};
 use flexarm_kinematics::MAX_COORDINATES;
+use flexarm_settings::Setting;
 use flexarm_stepping::Damping;
 use nalgebra::Matrix6;
 
 use crate::arm::options::{LinkModel, Modelling};
-use crate::error::LinkFormError;
+use crate::error::Error;
 use crate::robot::strength::Strength;
 
 /// Maximum number of fixed-interface modes of a link.
@@ -103,61 +104,90 @@ impl RobotLink {
     /// Returns the model of the link; rigid links have none.
     ///
     /// # Errors
-    /// [`LinkFormError`] with what the source of the link lacks.
-    pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, LinkFormError> {
-        self.form_or_key(modelling).map_err(|(_, error)| error)
+    /// [`Error::Modelling`] with what the source of the link lacks.
+    pub fn form(&self, modelling: &Modelling) -> Result<LinkForm, Error> {
+        self.form_or_key(modelling).map_err(|(_, error)| Error::Modelling(error))
     }
 
     /// As [`Self::form`], with the robot file key that requested what is missing.
-    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, LinkFormError)> {
-        let link = || self.flexible.link.clone();
+    pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, String)> {
+        let link = &self.flexible.link;
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {
-            LinkModel::Modal if self.stiffness_factors != [1.0; 6] => {
-                Err((RequestedKey::Directions, LinkFormError::ModalDirections { link: link() }))
-            }
-            LinkModel::Modal if self.stiffness.is_some() => {
-                Err((RequestedKey::Stiffness, LinkFormError::ModalStiffness { link: link() }))
-            }
+            LinkModel::Modal if self.stiffness_factors != [1.0; 6] => Err((
+                RequestedKey::Directions,
+                format!(
+                    "link {link:?}: stiffness_factors are those of the springs of a lumped link; a modal link has \
+                     one stiffness_factor"
+                ),
+            )),
+            LinkModel::Modal if self.stiffness.is_some() => Err((
+                RequestedKey::Stiffness,
+                format!(
+                    "link {link:?} is a modal body: its stiffness is that of the one spring between two rigid parts; \
+                     leave it out"
+                ),
+            )),
             LinkModel::Modal => self.modal(modelling).map(|modal| LinkForm::Modal(Arc::new(modal))),
             _ => match modelling.segments.unwrap_or(self.choices.segments) {
                 2 => Ok(LinkForm::TwoParts),
-                parts if self.stiffness.is_some() => {
-                    Err((RequestedKey::Stiffness, LinkFormError::ChainStiffness { link: link(), parts }))
-                }
+                parts if self.stiffness.is_some() => Err((
+                    RequestedKey::Stiffness,
+                    format!(
+                        "link {link:?} has {parts} parts: its stiffness is that of the one spring between two rigid \
+                         parts; leave it out"
+                    ),
+                )),
                 n => self.lumped(n).map_err(|error| (RequestedKey::Segments, error)),
             },
         }
     }
 
-    fn lumped(&self, segments: usize) -> Result<LinkForm, LinkFormError> {
-        let link = || self.flexible.link.clone();
+    fn lumped(&self, segments: usize) -> Result<LinkForm, String> {
+        let link = &self.flexible.link;
         let coordinates = 6 * segments.saturating_sub(1);
         if coordinates > MAX_COORDINATES {
-            return Err(LinkFormError::ManySegments { link: link(), segments, coordinates });
+            let message = format!(
+                "link {link:?}: {segments} segments have {coordinates} elastic coordinates, a robot can have {} in \
+                 all, for the time of a step grows with their cube: ask for at most {} in one link, or for modes, \
+                 which say more with fewer",
+                MAX_COORDINATES,
+                MAX_COORDINATES / 6 + 1
+            );
+            return Err(message);
         }
         if let Some(beam) = &self.beam {
             let chain = beam.chain(segments).map(LinkForm::Chain);
-            return chain.map_err(|source| LinkFormError::Chain { link: link(), source: Box::new(source) });
+            return chain.map_err(|source| format!("link {link:?}: {source}"));
         }
         let chains = self.flexible.reduced.details.as_ref().map_or(&[][..], |d| &d.chains[..]);
         let chain = chains.iter().find(|chain| chain.parts.len() == segments).cloned();
-        chain.map(LinkForm::Chain).ok_or_else(|| LinkFormError::NoChain {
-            link: link(),
-            segments,
-            stored: chains.iter().map(|chain| chain.parts.len()).collect(),
+        chain.map(LinkForm::Chain).ok_or_else(|| {
+            let stored: Vec<String> = chains.iter().map(|chain| chain.parts.len().to_string()).collect();
+            let stored = match stored.is_empty() {
+                true => "only two parts".into(),
+                false => format!("2, {} parts", stored.join(", ")),
+            };
+            format!(
+                "link {:?}: its .flex file has no chain of {segments} parts (it has {stored}): make it with flexarm \
+                 reduce {} {segments}, or choose another number of segments",
+                self.flexible.link,
+                Setting::Chains
+            )
         })
     }
 
-    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, LinkFormError)> {
+    fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, String)> {
         let name = &self.flexible.link;
-        let link = || name.clone();
-        let fail = |asked: RequestedKey| {
-            move |source: FemError| (asked, LinkFormError::NotModal { link: name.clone(), source: Box::new(source) })
-        };
+        let fail =
+            |asked: RequestedKey| move |source: FemError| (asked, format!("link {name:?} cannot be modal: {source}"));
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MAX_MODES) {
-            let error = LinkFormError::ManyModes { link: link(), modes, most: MAX_MODES };
+            let error = format!(
+                "link {name:?}: {modes} modes are requested, at most {MAX_MODES} are allowed: the work of a step \
+                 grows with the cube of their number, and those beyond the first dozen are far above what a drive or \
+                 a tool excites"
+            );
             return Err((RequestedKey::Modes, error));
         }
         let full = match &self.beam {
@@ -174,20 +204,29 @@ impl RobotLink {
                     let element = details?.superelement.as_ref()?;
                     Some(ModalLink::from_superelement(name, element).map_err(fail(RequestedKey::Model)))
                 };
-                let no_mass = || (RequestedKey::Model, LinkFormError::NoModalMass { link: link() });
-                let modal = stored.or_else(condensed).ok_or_else(no_mass)??;
+                let no_mass = format!(
+                    "link {name:?} cannot be modal: its .flex file has no mass over interfaces and modes; reduce the \
+                     mesh again with this version, or use model = \"lumped\""
+                );
+                let modal = stored.or_else(condensed).ok_or((RequestedKey::Model, no_mass))??;
                 let stored = modal.coordinates().saturating_sub(6 * modal.interfaces.len());
                 match wanted {
                     Some(n) if n < stored => modal.truncated(n).map_err(fail(RequestedKey::Modes))?,
                     Some(modes) if modes > stored => {
-                        return Err((RequestedKey::Modes, LinkFormError::FewModes { link: link(), modes, stored }));
+                        let message =
+                            format!("link {name:?}: {modes} modes are requested, its .flex file has {stored}");
+                        return Err((RequestedKey::Modes, message));
                     }
                     _ => modal,
                 }
             }
         };
         if self.choices.geometric && full.geometric.is_none() {
-            return Err((RequestedKey::Geometric, LinkFormError::NoGeometric { link: link() }));
+            let message = format!(
+                "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
+                Setting::Geometric
+            );
+            return Err((RequestedKey::Geometric, message));
         }
         match self.choices.eigenmodes {
             Some(keep) => full.orthogonalised(Some(keep)).map_err(fail(RequestedKey::Eigenmodes)),

@@ -57,7 +57,7 @@ impl Arm {
     /// * `at`: values of all actuated joints (rad or m), zero by default.
     ///
     /// # Errors
-    /// [`ValueError::NotExportable`](crate::ValueError::NotExportable) for arms with modal links,
+    /// [`Error::Value`] for arms with modal links,
     /// closed loops or screw joints; [`Error::Pose`] for joint values that do not fit.
     pub fn export(self: &Arc<Self>, at: Option<&[f64]>, format: RobotFormat) -> Result<RobotExport, Error> {
         let posed = self.posed(at)?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use flexarm_kinematics::{AxisMotion, Body, JointMotion, Pose};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::error::{Error, ValueError};
+use crate::error::Error;
 use crate::poses::posed::Posed;
 use crate::robot::Robot;
 
@@ -60,7 +60,7 @@ type MeshFile = (PathBuf, Vec<u8>);
 pub(super) fn parts(robot: &Robot, posed: &Posed) -> Result<(Vec<Part>, Vec<MeshFile>), Error> {
     let model = &posed.plant.model;
     if let Some(closed) = model.loops().first() {
-        return Err(ValueError::NotExportable { name: closed.name.clone(), what: "a closed loop" }.into());
+        return Err(not_exportable(&closed.name, "a closed loop"));
     }
     let bodies = model.bodies().iter();
     let mut parts = bodies.map(part).collect::<Result<Vec<_>, _>>()?;
@@ -82,8 +82,13 @@ pub(super) fn parts(robot: &Robot, posed: &Posed) -> Result<(Vec<Part>, Vec<Mesh
     Ok((parts, files))
 }
 
-fn part(body: &Body) -> Result<Part, ValueError> {
-    let cannot = |what| ValueError::NotExportable { name: body.joint.clone(), what };
+/// Error about a part that has no counterpart in formats of other simulators.
+fn not_exportable(name: &str, what: &str) -> Error {
+    Error::Value(format!("{name:?} is {what}, which cannot be exported"))
+}
+
+fn part(body: &Body) -> Result<Part, Error> {
+    let cannot = |what| not_exportable(&body.joint, what);
     let axis = |name: String, slides: bool, axis: Vector3<f64>, coordinate: usize| Axis {
         name,
         slides,
@@ -124,14 +129,11 @@ fn part(body: &Body) -> Result<Part, ValueError> {
 
 /// Checks that MuJoCo takes the inertia of each body, and joins each moving body without mass, such
 /// as the motor of an elastic gear, with its only child: MuJoCo lets no such body move.
-pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, ValueError> {
+pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, Error> {
     while let Some(light) = (1..parts.len()).find(|&k| parts[k].mass == 0.0 && !parts[k].joints.is_empty()) {
         let mut children = (light + 1..parts.len()).filter(|&k| parts[k].parent == light);
         let (Some(child), None) = (children.next(), children.next()) else {
-            return Err(ValueError::NotExportable {
-                name: parts[light].name.clone(),
-                what: "a moving body without mass",
-            });
+            return Err(not_exportable(&parts[light].name, "a moving body without mass"));
         };
         let (above, X_LC) = (parts[light].clone(), parts[child].X_PB);
         let moved = above.joints.into_iter().map(|axis| Axis {
@@ -152,10 +154,7 @@ pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, ValueError> {
         part.mass > 0.0 && (moments.min() < MIN_INERTIA || 2.0 * moments.max() > moments.sum() * (1.0 + 1e-9))
     };
     match parts[1..].iter().find(refused) {
-        Some(part) => Err(ValueError::NotExportable {
-            name: part.name.clone(),
-            what: "a body with an inertia that no mass distribution has",
-        }),
+        Some(part) => Err(not_exportable(&part.name, "a body with an inertia that no mass distribution has")),
         None => Ok(parts),
     }
 }

@@ -8,7 +8,7 @@ use super::steps_per_sample;
 use crate::arm::Arm;
 use crate::arm::options::RunOptions;
 use crate::caveat::pose::ArmAtRest;
-use crate::caveat::{Caveat, kinds, of_use, validity};
+use crate::caveat::{Finding, kinds, of_use, validity};
 use crate::motions::motion::Motion;
 use crate::poses::posed::strains;
 
@@ -33,7 +33,7 @@ impl BeforeRun<'_> {
     /// step size and the stepper.
     ///
     /// * `sag_m`: static TCP deflection (m).
-    pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Caveat> {
+    pub(crate) fn caveats(&self, sag_m: f64) -> Vec<Finding> {
         let Self { arm, plant, motion, options } = *self;
         let mut caveats = arm.link_caveats();
         caveats.extend(of_use::of_motion(motion, &arm.rigid));
@@ -54,18 +54,18 @@ impl BeforeRun<'_> {
         caveats.extend(self.ripple());
         if motion.trajectory.initial_speed() > 1e-6 {
             let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
-            caveats.push(Caveat::from_message("starts-moving", "run", message, ""));
+            caveats.push(Finding::warning("starts-moving", "run", message, ""));
         }
         caveats
     }
 
     /// As `caveats`, for a study that keeps no samples: also checks the links at rest.
-    pub fn caveats_of_study(&self, sag_m: f64) -> Vec<Caveat> {
+    pub fn caveats_of_study(&self, sag_m: f64) -> Vec<Finding> {
         self.caveats(sag_m).into_iter().chain(self.links_at_rest()).collect()
     }
 
     /// Checks for links that deflect too far at rest.
-    fn links_at_rest(&self) -> Vec<Caveat> {
+    fn links_at_rest(&self) -> Vec<Finding> {
         let (plant, model) = (self.plant, &self.plant.model);
         let mut state = State::zeros(model);
         plant.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
@@ -76,7 +76,7 @@ impl BeforeRun<'_> {
     }
 
     /// Reports damping that the stepper must approximate.
-    fn spook(&self) -> Option<Caveat> {
+    fn spook(&self) -> Option<Finding> {
         let changes = matches!(self.options.stepper, StepperKind::Spook(_)) && !self.plant.proportional;
         changes.then(|| {
             let betas: Vec<String> = self.plant.tau.iter().map(|b| format!("{b:.2e}")).collect();
@@ -85,13 +85,13 @@ impl BeforeRun<'_> {
                  exact for the first mode",
                 betas.join(", ")
             );
-            Caveat::from_message("spook-damping", "run", message, "")
+            Finding::warning("spook-damping", "run", message, "")
         })
     }
 
     /// Checks whether the steps resolve the ripple of gears, at the maximum speed over a thousand
     /// points of the motion.
-    fn ripple(&self) -> Option<Caveat> {
+    fn ripple(&self) -> Option<Finding> {
         let (plant, model, duration) = (self.plant, &self.plant.model, self.motion.trajectory.duration());
         if plant.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {
             return None;

@@ -5,7 +5,7 @@ use flexarm_log::{Event, EventKind};
 use flexarm_stepping::StepError;
 
 use super::RunLoop;
-use crate::caveat::{Caveat, kinds};
+use crate::caveat::{Finding, kinds};
 use crate::error::Error;
 
 impl RunLoop<'_> {
@@ -57,9 +57,9 @@ impl RunLoop<'_> {
 
 /// Blames the model of a link instead of the step for an iteration that failed while the link was
 /// deflected beyond its model.
-pub(super) fn beyond_model(error: Error, caveats: &[Caveat]) -> Error {
+pub(super) fn beyond_model(error: Error, caveats: &[Finding]) -> Error {
     let of_shape =
-        |caveat: &&Caveat| [kinds::LARGE_DEFORMATION.code, kinds::LARGE_STRAIN.code].contains(&&*caveat.code);
+        |caveat: &&Finding| [kinds::LARGE_DEFORMATION.code, kinds::LARGE_STRAIN.code].contains(&&*caveat.code);
     match (error, caveats.iter().find(of_shape)) {
         (Error::Step { source: StepError::NotConverged { t, .. }, partial }, Some(caveat)) => {
             Error::Step { source: StepError::BeyondModel { t, doubt: caveat.message.clone() }, partial }

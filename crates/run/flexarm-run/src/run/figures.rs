@@ -9,14 +9,14 @@ use super::before::BeforeRun;
 use super::{Detail, RunLoop, moves};
 use crate::arm::Owner;
 use crate::arm::options::RunOptions;
-use crate::caveat::{Caveat, drives, kinds, validity};
+use crate::caveat::{Finding, drives, kinds, validity};
 use crate::run::headline::{self, Bending, ShareFigures};
 use crate::run::monitor::stress::StressMonitor;
 use crate::run::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
 
 impl RunLoop<'_> {
     /// Returns the figures so far; `robot_caveats` come before those of the run.
-    pub(super) fn summary(&self, robot_caveats: Vec<Caveat>) -> (Summary, Vec<Event>) {
+    pub(super) fn summary(&self, robot_caveats: Vec<Finding>) -> (Summary, Vec<Event>) {
         // A run that stopped immediately has no metrics.
         let metrics = self.monitors.tool.result().metrics().ok();
         let metrics = metrics.as_ref().filter(|_| self.options.with_twin);
@@ -117,7 +117,7 @@ impl RunLoop<'_> {
     }
 
     /// Caveats about the input and the validity of the models in the run so far.
-    fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Caveat>) -> Vec<Caveat> {
+    fn caveats(&self, summary: &Summary, sag_m: f64, mut caveats: Vec<Finding>) -> Vec<Finding> {
         let (arm, plant, motion, options) = (self.arm, &*self.plant, self.motion, self.options);
         caveats.extend(BeforeRun { arm, plant, motion, options }.caveats(sag_m));
         caveats.extend(self.drive_caveats());
@@ -139,14 +139,14 @@ impl RunLoop<'_> {
         caveats.extend(validity::energy(self.monitors.energy.result().imbalance));
         let efforts = self.effort_caveats();
         // The torque of the run replaces that of the rigid robot.
-        let is_known = |of: &Caveat| efforts.iter().any(|run| run.location == of.location);
+        let is_known = |of: &Finding| efforts.iter().any(|run| run.location == of.location);
         caveats.retain(|caveat| caveat.code != kinds::MOTION_EFFORT.code || !is_known(caveat));
         caveats.extend(efforts);
         caveats
     }
 
     /// Caveats about modal links that turn fast without geometric stiffening.
-    fn spin_caveats(&self) -> Vec<Caveat> {
+    fn spin_caveats(&self) -> Vec<Finding> {
         let first_hz = self.plant.modes.frequencies_hz().first().copied().unwrap_or(f64::INFINITY);
         let links = self.arm.spans.iter().zip(self.monitors.strains.result()).enumerate();
         let elements = || self.plant.elements.iter().zip(&self.arm.owners);
@@ -157,7 +157,7 @@ impl RunLoop<'_> {
     }
 
     /// Caveats about gearbox deflections.
-    fn drive_caveats(&self) -> Vec<Caveat> {
+    fn drive_caveats(&self) -> Vec<Finding> {
         let coordinates = self.plant.model.coordinates();
         let drives = self.robot.drives.iter().zip(self.monitors.deflections.result()).enumerate();
         let elastic = drives.filter(|(k, _)| self.arm.owners.contains(&Owner::Drive(*k)));
@@ -173,10 +173,10 @@ impl RunLoop<'_> {
     }
 
     /// Caveats about drive torques and forces that exceed their limits.
-    fn effort_caveats(&self) -> Vec<Caveat> {
+    fn effort_caveats(&self) -> Vec<Finding> {
         let (coordinates, loads) = (self.plant.model.coordinates(), self.monitors.drive_loads.result());
         let peaks: Vec<f64> = loads.iter().map(|load| load.peak).collect();
-        let mut caveats: Vec<Caveat> = validity::efforts(&kinds::EFFORT, coordinates, &peaks).collect();
+        let mut caveats: Vec<Finding> = validity::efforts(&kinds::EFFORT, coordinates, &peaks).collect();
         for (c, load) in coordinates.iter().zip(loads).filter(|(_, load)| load.at_limit > 0) {
             let share = 100.0 * load.at_limit as f64 / self.monitors.tool.result().len() as f64;
             caveats.push(kinds::SERVO_LIMIT.found(format!("joint {:?}", c.joint), share, 0.0));

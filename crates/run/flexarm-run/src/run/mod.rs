@@ -43,7 +43,7 @@ use rayon::prelude::*;
 use crate::arm::bends::stations;
 use crate::arm::options::{Outputs, RunOptions};
 use crate::arm::{Arm, Owner};
-use crate::caveat::{self, Caveat};
+use crate::caveat::{self, Finding};
 use crate::error::Error;
 use crate::motions::motion::Motion;
 use crate::motions::scenario::Scenario;
@@ -237,7 +237,7 @@ fn write_results(
 }
 
 /// Adds caveats about loads, how the run ended, and its times.
-fn complete(summary: &mut Summary, load_caveats: Vec<Caveat>, end: &Result<(), Error>, stopwatch: &Stopwatch) {
+fn complete(summary: &mut Summary, load_caveats: Vec<Finding>, end: &Result<(), Error>, stopwatch: &Stopwatch) {
     summary.caveats.extend(load_caveats);
     summary.caveats = caveat::once_each(std::mem::take(&mut summary.caveats));
     summary.warnings = caveat::warnings(&summary.caveats);

@@ -8,8 +8,8 @@ use flexarm_stepping::{Load, Plant, StepError, StepRule, Stepper, new_stepper};
 use crate::arm::Arm;
 use crate::arm::options::RunOptions;
 use crate::caveat::size::Size;
-use crate::caveat::{self, Caveat};
-use crate::error::{Error, ValueError};
+use crate::caveat::{self, Finding};
+use crate::error::Error;
 use crate::motions::loads_file::EXPRESSION_PERIOD;
 use crate::motions::motion::Motion;
 use crate::motions::scenario::Scenario;
@@ -22,7 +22,7 @@ use crate::run::magnification::Expected;
 pub(crate) struct Checked {
     pub(crate) plant: Arc<Plant>,
     pub(crate) stepper: Box<dyn Stepper>,
-    pub(crate) load_caveats: Vec<Caveat>,
+    pub(crate) load_caveats: Vec<Finding>,
 }
 
 impl Arm {
@@ -31,7 +31,7 @@ impl Arm {
     ///
     /// # Errors
     /// All errors in the input that can be found before a stepper is built.
-    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(Plant, Vec<Caveat>), Error> {
+    pub fn at_start(&self, scenario: &Scenario, options: &RunOptions) -> Result<(Plant, Vec<Finding>), Error> {
         let motion = &scenario.motion;
         runnable(motion, options)?;
         loops::along_motion(&self.rigid, &motion.trajectory)?;
@@ -77,7 +77,7 @@ pub fn loaded(
     scenario: &Scenario,
     options: &RunOptions,
     mut plant: Plant,
-) -> Result<(Plant, Vec<Caveat>), Error> {
+) -> Result<(Plant, Vec<Finding>), Error> {
     let failed = |source: StepError| Error::Step { source, partial: false };
     let mut load_caveats = Vec::new();
     if !scenario.loads.is_empty() || !scenario.payloads.is_empty() {
@@ -102,23 +102,41 @@ const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
 /// Checks that the options are valid, and that step size and duration give a finite run.
 fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
-    let positive =
-        |x: f64, otherwise: fn(f64) -> ValueError| if x.is_finite() && x > 0.0 { Ok(()) } else { Err(otherwise(x)) };
-    positive(options.step_s, ValueError::Step)?;
-    positive(options.log_rate_hz, ValueError::LogRate)?;
-    positive(options.settling_band_m, ValueError::SettlingBand)?;
-    positive(options.magnification.unwrap_or(1.0), ValueError::Magnification)?;
+    for (setting, what, x, unit) in [
+        (Setting::Step, "step", options.step_s, "s"),
+        (Setting::LogRate, "log rate", options.log_rate_hz, "Hz"),
+        (Setting::SettlingBand, "settling band", options.settling_band_m, "m"),
+        (Setting::Magnification, "factor of deflections", options.magnification.unwrap_or(1.0), "times"),
+    ] {
+        if !(x.is_finite() && x > 0.0) {
+            return Err(Error::Value(format!("{setting}: the {what} must be positive, found {x} {unit}")));
+        }
+    }
     if let Some(factor) = options.magnification.filter(|factor| !MAGNIFICATIONS.contains(factor)) {
         let (least, most) = (*MAGNIFICATIONS.start(), *MAGNIFICATIONS.end());
-        return Err(ValueError::MagnificationRange { found: factor, least, most }.into());
+        let message = format!(
+            "the factor of deflections ({}) is {factor:e}: expected one from {least} to {most}, 1 shows them as they \
+             are",
+            Setting::Magnification
+        );
+        return Err(Error::Value(message));
     }
     let duration = motion.trajectory.duration();
     let (step_s, duration_s) = (options.step_s, duration);
     if step_s > duration_s {
-        return Err(ValueError::StepBeyondMotion { step_s, duration_s }.into());
+        return Err(Error::Value(format!(
+            "the step ({} {step_s} s) is longer than the motion ({duration_s} s)",
+            Setting::Step
+        )));
     }
     if duration_s / step_s > MAX_STEPS {
-        return Err(ValueError::TooManySteps { step_s, duration_s, most: MAX_STEPS }.into());
+        let message = format!(
+            "{duration_s} s in steps of {step_s:e} s make {:.1e} steps, at most {MAX_STEPS:.0e} are taken: raise {} \
+             or cut the trajectory",
+            &duration_s / &step_s,
+            Setting::Step
+        );
+        return Err(Error::Value(message));
     }
     Ok(())
 }
@@ -144,7 +162,7 @@ fn stop_within(load: &mut Load, h: f64) {
 }
 
 /// Caveats about loads whose period the step size does not resolve.
-fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
+fn fast_loads(loads: &[Load], h: f64) -> Vec<Finding> {
     let fast = |load: &Load| {
         let period = load.wrench.period;
         let steps = period / h;
@@ -155,6 +173,6 @@ fn fast_loads(loads: &[Load], h: f64) -> Vec<Caveat> {
         })
     };
     let caveat =
-        |text: String| Caveat::from_message("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
+        |text: String| Finding::warning("short-load", "loads", text, "lower the step").mended_by(&[Setting::Step]);
     loads.iter().filter_map(|load| fast(load).map(caveat)).collect()
 }

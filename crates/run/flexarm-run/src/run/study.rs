@@ -9,13 +9,14 @@ use flexarm_log::{Recorder, RecordingFormat, StudyRecorder, Trace};
 
 use crate::arm::Arm;
 use crate::arm::options::{Outputs, RunOptions};
-use crate::error::{Error, StudyError};
+use crate::error::Error;
 use crate::motions::scenario::Scenario;
 use crate::run::comparison::difference;
 use crate::run::magnification::{Expected, fit_color_scale};
 use crate::run::record::{files_of_a_run, refuse_to_overwrite};
 use crate::run::summary::Summary;
 use crate::run::{Keep, Progress, Run, RunRequest};
+use flexarm_settings::Setting;
 
 /// One run of a study.
 #[derive(Debug)]
@@ -52,7 +53,7 @@ pub fn compare_study(
     progress: &mut Progress<'_>,
 ) -> Result<(Summary, Vec<(String, Trace)>), Error> {
     let Some(main) = variants.first() else {
-        return Err(StudyError::Empty.into());
+        return Err(Error::Value("a study needs at least one run".into()));
     };
     let folders = folders(variants)?;
     let mut options = main.options.clone();
@@ -126,24 +127,37 @@ const LONGEST_NAME: usize = 100;
 
 /// Returns the names of the runs' folders: the labels, restricted to characters that every file
 /// system accepts.
-fn folders(variants: &[Variant]) -> Result<Vec<String>, StudyError> {
+fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
     let mut taken = BTreeSet::new();
     let mut names = Vec::new();
     for variant in variants {
         let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' };
         let name: String = variant.label.chars().map(plain).collect();
         if name.is_empty() || name.starts_with('.') || !taken.insert(name.to_lowercase()) {
-            return Err(StudyError::LabelTwice { label: variant.label.clone() });
+            let message = format!(
+                "the label {label:?} names two runs of the study, or none: give each {} a name=... of its own",
+                Setting::Variant,
+                label = variant.label
+            );
+            return Err(Error::Value(message));
         }
         if files_of_a_run().any(|file| file == name.to_lowercase()) {
-            return Err(StudyError::LabelOfFile { label: variant.label.clone() });
+            let message = format!(
+                "the label {label:?} is the name of a file of the study: give its {} another name=...",
+                Setting::Variant,
+                label = variant.label
+            );
+            return Err(Error::Value(message));
         }
         if name.len() > LONGEST_NAME {
-            return Err(StudyError::LongLabel {
-                label: variant.label.clone(),
-                letters: name.len(),
-                most: LONGEST_NAME,
-            });
+            let message = format!(
+                "the label {label:?} has {letters} letters, at most {LONGEST_NAME} make a folder: give its {} a \
+                 short name=...",
+                Setting::Variant,
+                label = variant.label,
+                letters = name.len()
+            );
+            return Err(Error::Value(message));
         }
         names.push(name);
     }

@@ -8,7 +8,7 @@ use flexarm_stepping::Counts;
 use serde::{Deserialize, Serialize};
 
 use crate::arm::options::RunOptions;
-use crate::caveat::Caveat;
+use crate::caveat::Finding;
 use crate::run::headline::{Bending, ShareFigures};
 use crate::run::monitor::tool_path::PathFigures;
 use crate::run::settling::within;
@@ -71,7 +71,7 @@ pub struct Summary {
     /// Warnings among [`Summary::caveats`], as sentences.
     pub warnings: Vec<String>,
     /// Probable errors in the input, and limits of the result's validity.
-    pub caveats: Vec<Caveat>,
+    pub caveats: Vec<Finding>,
     /// Written files.
     pub files: Files,
     /// Label of the run in a study.

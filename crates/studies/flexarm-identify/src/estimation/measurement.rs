@@ -550,7 +550,8 @@ impl Residuals for MeasuredArm<'_> {
         for (reading, first) in self.by_pose() {
             let block = self.block(&mut workspaces, reading, own, slopes)?;
             // Derivatives do not exist at a dead point of a loop.
-            if let (Some(dead), false) = (self.nominal.model.loops().first(), block.slopes.iter().all(|x| x.is_finite()))
+            if let (Some(dead), false) =
+                (self.nominal.model.loops().first(), block.slopes.iter().all(|x| x.is_finite()))
             {
                 let source = StepError::OpenLoop { t: 0.0, name: dead.name.clone() };
                 return Err(NoAnswer { reading: reading.name.clone(), source });

@@ -53,9 +53,9 @@ impl Interpreter<'_> {
             ("abs_filename", [_]) => return Ok(Value::text(self.beside(&text(0)).display().to_string())),
             ("arg", [_]) => return self.argument(&text(0)).map(Value::text),
             ("dotify", [dict]) => return Ok(dict.clone()),
-            ("message", _) => self.remark(crate::Severity::Note, "xacro-message", message(), ""),
-            ("warning", _) => self.remark(crate::Severity::Warning, "xacro-warning", message(), ""),
-            ("error", _) => self.remark(crate::Severity::Warning, "xacro-error", message(), ""),
+            ("message", _) => self.remark(flexarm_settings::Severity::Note, "xacro-message", message(), ""),
+            ("warning", _) => self.remark(flexarm_settings::Severity::Warning, "xacro-warning", message(), ""),
+            ("error", _) => self.remark(flexarm_settings::Severity::Warning, "xacro-error", message(), ""),
             ("print_location", _) => {}
             ("fatal", _) => {
                 return Err(ExpressionError::new(message()).help("the file itself stops here: see what it requires"));

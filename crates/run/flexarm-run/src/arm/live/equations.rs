@@ -12,7 +12,7 @@ use flexarm_stepping::{EquationsOfMotion, PrescribedMotion};
 use crate::arm::Arm;
 use crate::arm::joint_values::joint_values;
 use crate::arm::live::{Commanded, LiveOptions, Loaded, Readings};
-use crate::error::{Error, ValueError};
+use crate::error::Error;
 
 /// Inputs of [`Equations`].
 #[derive(Clone, Copy, Debug)]
@@ -139,7 +139,7 @@ impl Equations {
             ("the state", [x, v].concat().into_iter()),
         ] {
             if let Some(found) = values.find(|value| !value.is_finite()) {
-                return Err(ValueError::NotFinite { what, found }.into());
+                return Err(Error::not_finite(what, found));
             }
         }
         {

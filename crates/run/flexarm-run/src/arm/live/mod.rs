@@ -14,6 +14,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use flexarm_kinematics::Wrench;
+use flexarm_settings::Setting;
 use flexarm_stepping::{
     Load, Observation, Plant, PrescribedMotion, Start, StepRule, Stepper, TimedWrench, new_stepper,
 };
@@ -21,7 +22,7 @@ use flexarm_stepping::{
 use crate::arm::Arm;
 use crate::arm::joint_values::joint_values;
 use crate::arm::options::RunOptions;
-use crate::error::{Error, ValueError};
+use crate::error::Error;
 use crate::motions::payload::PayloadChange;
 use crate::robot::PAYLOAD_LINK;
 
@@ -193,16 +194,21 @@ impl Arm {
     ) -> Result<Live, Error> {
         let servos = own.servos;
         if servos == Servos::Open && !self.has_servo() {
-            return Err(ValueError::NoServo.into());
+            return Err(Error::Value(
+                "open servos need joints that are driven by torque: model the drives as servos".into(),
+            ));
         }
         if options.stepper.entry().steps == StepRule::ByErrorControl {
-            return Err(ValueError::RunsAhead(options.stepper.name()).into());
+            return Err(runs_ahead(options.stepper.name()));
         }
         let names: Vec<&str> = self.joints().collect();
         let at = joint_values(at, &names)?;
         let step_s = options.step_s;
         if !(step_s.is_finite() && step_s > 0.0) {
-            return Err(ValueError::Step(step_s).into());
+            return Err(Error::Value(format!(
+                "{setting}: the step must be positive, found {step_s} s",
+                setting = Setting::Step
+            )));
         }
         whole_steps(period_s, step_s)?;
         let targets = Arc::new(Targets(RwLock::new(Period::at_rest(&at, period_s))));
@@ -261,17 +267,29 @@ impl Loaded {
         Self { with: Arc::new(plant), without: without.map(Arc::new) }
     }
 
-    fn carrying(&self, payload: bool) -> Result<&Arc<Plant>, ValueError> {
-        if payload { Ok(&self.with) } else { self.without.as_ref().ok_or(ValueError::NoPayload) }
+    fn carrying(&self, payload: bool) -> Result<&Arc<Plant>, Error> {
+        if payload {
+            return Ok(&self.with);
+        }
+        let message = "this arm has no payload that can be put down: give its robot file a [payload] on a rigid link";
+        self.without.as_ref().ok_or_else(|| Error::Value(message.into()))
     }
 }
 
+/// Error for a stepper that controls its step size.
+fn runs_ahead(name: &str) -> Error {
+    Error::Value(format!("the stepper {name} runs ahead of the commands; use one with a fixed step size"))
+}
+
 /// Returns the number of steps in a control period (s).
-fn whole_steps(period_s: f64, step_s: f64) -> Result<usize, ValueError> {
+fn whole_steps(period_s: f64, step_s: f64) -> Result<usize, Error> {
     let steps = (period_s / step_s).round();
     match (1.0..1e9).contains(&steps) && (period_s / step_s - steps).abs() <= WHOLE {
         true => Ok(steps as usize),
-        false => Err(ValueError::Period { period_s, step_s }),
+        false => Err(Error::Value(format!(
+            "a control period of {period_s} s is not a whole number of steps ({} {step_s} s)",
+            Setting::Step
+        ))),
     }
 }
 
@@ -379,7 +397,7 @@ impl Live {
         }
         let F = &command.wrench;
         if let Some(&found) = F.force.iter().chain(F.torque.iter()).find(|value| !value.is_finite()) {
-            return Err(ValueError::NotFinite { what: "the wrench", found }.into());
+            return Err(Error::not_finite("the wrench", found));
         }
         let begin = self.stepper.time();
         let jumps = {
@@ -424,7 +442,7 @@ impl Live {
     /// # Errors
     /// [`Error::Value`] if the stepper cannot be copied; those of [`Arm::live`] can.
     pub fn state(&self) -> Result<LiveState, Error> {
-        let stepper = self.stepper.copy().ok_or(ValueError::RunsAhead(self.options.stepper.name()))?;
+        let stepper = self.stepper.copy().ok_or_else(|| runs_ahead(self.options.stepper.name()))?;
         Ok(LiveState {
             targets: self.targets.clone(),
             period: self.targets.0.read().unwrap_or_else(PoisonError::into_inner).clone(),
@@ -441,9 +459,11 @@ impl Live {
     /// [`Error::Value`] for a state of another [`Live`].
     pub fn restore(&mut self, state: &LiveState) -> Result<(), Error> {
         if !Arc::ptr_eq(&self.targets, &state.targets) {
-            return Err(ValueError::OtherState.into());
+            return Err(Error::Value(
+                "the state belongs to another arm; a state returns only to the arm from which it was taken".into(),
+            ));
         }
-        self.stepper = state.stepper.copy().ok_or(ValueError::RunsAhead(self.options.stepper.name()))?;
+        self.stepper = state.stepper.copy().ok_or_else(|| runs_ahead(self.options.stepper.name()))?;
         self.targets.0.write().unwrap_or_else(PoisonError::into_inner).clone_from(&state.period);
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = state.push;
         self.has_payload = state.has_payload;

@@ -204,30 +204,24 @@ fn frame_of(
     Ok(Pose::from_parts(Translation3::from(p), R.unwrap_or_else(Rotation3::identity)))
 }
 
-/// Reason why an entry gives no orientation.
-#[derive(Debug, thiserror::Error)]
-enum OrientationError {
-    #[error("give rpy or quaternion, not both")]
-    Twice,
-    #[error("quaternion = [w, x, y, z] has the length {length:.6}: it must be 1")]
-    NotUnit { length: f64 },
-}
-
 /// Converts roll, pitch, yaw about fixed axes x, y, z (as in URDF) or a quaternion w, x, y, z.
 fn rotation(
     rpy: Option<[f64; 3]>,
     quaternion: Option<[f64; 4]>,
     units: Units,
-) -> Result<Option<Rotation3<f64>>, OrientationError> {
+) -> Result<Option<Rotation3<f64>>, String> {
     match (rpy, quaternion) {
-        (Some(_), Some(_)) => Err(OrientationError::Twice),
+        (Some(_), Some(_)) => Err("give rpy or quaternion, not both".into()),
         (Some([r, p, y]), None) => {
             Ok(Some(Rotation3::from_euler_angles(r * units.angle, p * units.angle, y * units.angle)))
         }
         (None, Some([w, x, y, z])) => {
             let q = Quaternion::new(w, x, y, z);
             if (q.norm() - 1.0).abs() > 1e-3 {
-                return Err(OrientationError::NotUnit { length: q.norm() });
+                return Err(format!(
+                    "quaternion = [w, x, y, z] has the length {length:.6}: it must be 1",
+                    length = q.norm()
+                ));
             }
             Ok(Some(UnitQuaternion::from_quaternion(q).to_rotation_matrix()))
         }

@@ -19,7 +19,7 @@ use flexarm_path::{
 use flexarm_trajectory::Trajectory;
 use nalgebra::DVector;
 
-use crate::caveat::Caveat;
+use crate::caveat::Finding;
 use crate::caveat::slip::slip;
 use crate::error::Error;
 use crate::robot::controller_entry::RobotAxis;
@@ -232,9 +232,8 @@ impl ToolPath {
     }
 
     /// Returns the caveats about the path.
-    pub(crate) fn caveats(&self) -> Vec<Caveat> {
-        let caveat =
-            |text: &String| Caveat::from_message("tool-path", &self.file, format!("{}: {text}", self.file), "");
+    pub(crate) fn caveats(&self) -> Vec<Finding> {
+        let caveat = |text: &String| Finding::warning("tool-path", &self.file, format!("{}: {text}", self.file), "");
         let notes = self.notes.iter().map(|text| caveat(text).as_note());
         self.warnings.iter().map(caveat).chain(notes).collect()
     }

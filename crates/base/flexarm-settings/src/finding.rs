@@ -1,19 +1,24 @@
-//! Caveats: likely mistakes in an input, or limits to the validity of a result, as values.
+//! Findings: errors and likely mistakes in an input, and limits to the validity of a result.
 //!
-//! A caveat compares a value with a physical reference. A [`CaveatKind`] is a constant of the crate
-//! that finds it; its message is formatted in one place ([`CaveatKind::found`]), so that the same
+//! An error prevents a result. Warnings and notes, called caveats, come with one; a caveat often
+//! compares a value with a physical reference. A [`FindingKind`] is a constant of the crate that
+//! finds it; its message is formatted in one place ([`FindingKind::found`]), so that the same
 //! finding always has the same wording.
 //!
-//! Not here: the kinds, their references, and what makes a model invalid, which is an error.
+//! Not here: the kinds and their references.
+
+use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
 use crate::Setting;
 
-/// Severity of a caveat.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+/// Severity of a finding, worst first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
+    /// The input cannot be used.
+    Error,
     /// The input is probably wrong, or the result is not reliable.
     #[default]
     Warning,
@@ -22,18 +27,19 @@ pub enum Severity {
 }
 
 impl Severity {
-    /// `warning` or `note`.
+    /// `error`, `warning` or `note`.
     pub fn word(self) -> &'static str {
         match self {
+            Self::Error => "error",
             Self::Warning => "warning",
             Self::Note => "note",
         }
     }
 }
 
-/// Kind of a caveat: an entry of the catalogue.
+/// Kind of a finding about a number: an entry of the catalogue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CaveatKind {
+pub struct FindingKind {
     /// Short, stable identifier for programs.
     pub code: &'static str,
     /// Default severity.
@@ -47,15 +53,17 @@ pub struct CaveatKind {
     pub help: &'static str,
 }
 
-/// Single caveat. SI units.
+/// Something found in an input or in a result. SI units.
+///
+/// `Display` gives `where: message`, and the remedy on a line of its own.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Caveat {
+pub struct Finding {
     /// Severity.
     pub severity: Severity,
     /// Short, stable identifier of its kind.
     pub code: String,
-    /// Subject: a link, a joint, the payload, a file.
+    /// Place in a file, as `path:line:column`, or the subject: a link, a joint, the payload, a file.
     #[serde(rename = "where")]
     pub location: String,
     /// Complete message in one sentence.
@@ -79,7 +87,7 @@ pub struct Caveat {
     pub of_description: bool,
 }
 
-impl CaveatKind {
+impl FindingKind {
     /// Creates a kind with severity `Warning`.
     pub const fn warning(code: &'static str, says: &'static str, unit: &'static str, help: &'static str) -> Self {
         Self { code, severity: Severity::Warning, says, unit, help }
@@ -96,7 +104,7 @@ impl CaveatKind {
     }
 
     /// Creates the caveat for a subject with its value and reference.
-    pub fn found(&self, location: impl Into<String>, value: f64, yardstick: f64) -> Caveat {
+    pub fn found(&self, location: impl Into<String>, value: f64, yardstick: f64) -> Finding {
         let location = location.into();
         let settings = self.settings();
         // Replace setting names first: a location may contain braces.
@@ -106,19 +114,17 @@ impl CaveatKind {
             .replace("{value}", &figure(value))
             .replace("{yardstick}", &figure(yardstick))
             .replace("{unit}", self.unit);
-        Caveat {
+        Finding {
             severity: self.severity,
             code: self.code.into(),
             location,
             message,
-            value: Some(value).filter(|x| x.is_finite()),
-            yardstick: Some(yardstick).filter(|x| x.is_finite()),
             unit: self.unit.into(),
-            likely: String::new(),
             help: self.help.into(),
             settings,
-            of_description: false,
+            ..Finding::default()
         }
+        .measured(value, yardstick)
     }
 
     /// Settings whose change may resolve the caveat.
@@ -127,9 +133,19 @@ impl CaveatKind {
     }
 }
 
-impl Caveat {
-    /// Creates a caveat without a value, from a complete message.
-    pub fn from_message(code: &str, location: impl Into<String>, message: impl Into<String>, help: &str) -> Self {
+impl Finding {
+    /// Creates an error: what was found, what was expected, and the remedy.
+    pub fn error(code: &str, location: impl Into<String>, message: impl Into<String>, help: impl Into<String>) -> Self {
+        Self { severity: Severity::Error, ..Self::warning(code, location, message, help) }
+    }
+
+    /// Creates a warning; `message` is a complete sentence.
+    pub fn warning(
+        code: &str,
+        location: impl Into<String>,
+        message: impl Into<String>,
+        help: impl Into<String>,
+    ) -> Self {
         Self {
             code: code.into(),
             location: location.into(),
@@ -137,6 +153,13 @@ impl Caveat {
             help: help.into(),
             ..Self::default()
         }
+    }
+
+    /// Adds a value with its reference, at which the finding starts.
+    #[must_use]
+    pub fn measured(self, value: f64, yardstick: f64) -> Self {
+        let [value, yardstick] = [value, yardstick].map(|x| Some(x).filter(|x| x.is_finite()));
+        Self { value, yardstick, ..self }
     }
 
     /// Adds settings whose change may resolve it.
@@ -163,11 +186,28 @@ impl Caveat {
         self
     }
 
+    /// Whether it is an error.
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+
     /// Whether it is a warning.
     pub fn warns(&self) -> bool {
         self.severity == Severity::Warning
     }
 }
+
+impl fmt::Display for Finding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.location.is_empty() {
+            write!(f, "{}: ", self.location)?;
+        }
+        f.write_str(&self.message)?;
+        if self.help.is_empty() { Ok(()) } else { write!(f, "\n  help: {}", self.help) }
+    }
+}
+
+impl std::error::Error for Finding {}
 
 /// Placeholder of a setting in the message template of a kind.
 fn placeholder(setting: Setting) -> String {
@@ -175,16 +215,16 @@ fn placeholder(setting: Setting) -> String {
 }
 
 /// Messages of the caveats that are warnings.
-pub fn warnings(caveats: &[Caveat]) -> Vec<String> {
+pub fn warnings(caveats: &[Finding]) -> Vec<String> {
     caveats.iter().filter(|caveat| caveat.warns()).map(|caveat| caveat.message.clone()).collect()
 }
 
 /// Removes duplicates: of caveats with the same code and subject, the last one is kept, at the
 /// position of the first.
-pub fn once_each(caveats: Vec<Caveat>) -> Vec<Caveat> {
-    let mut kept: Vec<Caveat> = Vec::with_capacity(caveats.len());
+pub fn once_each(caveats: Vec<Finding>) -> Vec<Finding> {
+    let mut kept: Vec<Finding> = Vec::with_capacity(caveats.len());
     for caveat in caveats {
-        let same = |k: &Caveat| k.value.is_some() && k.code == caveat.code && k.location == caveat.location;
+        let same = |k: &Finding| k.value.is_some() && k.code == caveat.code && k.location == caveat.location;
         match kept.iter().position(same) {
             Some(earlier) => kept[earlier] = caveat,
             None if kept.contains(&caveat) => {}

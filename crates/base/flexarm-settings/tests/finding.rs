@@ -1,10 +1,10 @@
 //! Caveats as values.
 
-use flexarm_settings::caveat::{Caveat, CaveatKind, figure, once_each, warnings};
+use flexarm_settings::finding::{Finding, FindingKind, figure, once_each, warnings};
 
 #[test]
 fn a_caveat_says_where_what_and_against_what() {
-    let kind = CaveatKind::warning("far", "{where} is {value} m away, the arm reaches {yardstick} m", "m", "");
+    let kind = FindingKind::warning("far", "{where} is {value} m away, the arm reaches {yardstick} m", "m", "");
     let caveat = kind.found("the TCP", 350.0, 2.9).likely("about 1000 times: millimetres?");
     let message = "the TCP is 350 m away, the arm reaches 2.9 m (about 1000 times: millimetres?)";
     assert_eq!(caveat.message, message);
@@ -13,18 +13,18 @@ fn a_caveat_says_where_what_and_against_what() {
     for key in ["severity", "code", "where", "message", "value", "yardstick", "unit", "likely"] {
         assert!(json.get(key).is_some(), "{key}: {json}");
     }
-    assert_eq!(serde_json::from_value::<Caveat>(json).unwrap(), caveat);
+    assert_eq!(serde_json::from_value::<Finding>(json).unwrap(), caveat);
     assert_eq!(warnings(&[caveat.clone(), caveat.as_note()]), [message]);
 }
 
 #[test]
 fn the_same_caveat_is_told_once_with_its_last_value() {
-    let kind = CaveatKind::warning("bend", "{where} {value} {yardstick}", "rad", "");
+    let kind = FindingKind::warning("bend", "{where} {value} {yardstick}", "rad", "");
     let found = |link: &str, x: f64| kind.found(link, x, 0.05);
     let kept = once_each(vec![found("a", 0.1), found("b", 0.2), found("a", 0.3)]);
     assert_eq!(kept, [found("a", 0.3), found("b", 0.2)]);
     // Caveats without a value are distinct unless they are equal.
-    let caveat = |text: &str| Caveat::from_message("file", "x", text, "");
+    let caveat = |text: &str| Finding::warning("file", "x", text, "");
     assert_eq!(once_each(vec![caveat("one"), caveat("two"), caveat("one")]), [caveat("one"), caveat("two")]);
 }
 
