@@ -780,7 +780,7 @@ fn a_loop_closes_to_rounding_with_elastic_links() {
 #[test]
 fn a_loop_closes_to_rounding_with_axes_off_its_plane() {
     let mut tree = palletiser(GENERAL, Cut::Top);
-    for (name, tilt) in [("crank", 0.015), ("elbow", -0.01)] {
+    for (name, tilt) in [("crank", 0.01), ("elbow", -0.008)] {
         let turn = Rotation3::from_axis_angle(&Vector3::x_axis(), tilt);
         tree.joints.iter_mut().filter(|j| j.name == name).for_each(|j| j.X_PJ.rotation *= turn);
     }

@@ -122,7 +122,8 @@ fn page(all: &[Fitted]) -> Case {
         let [own, others] = fit.rms_mm();
         let reported = 1e3 * 3f64.sqrt() * fit.found.residual.after;
         let name = fit.name;
-        case.claim(format!("{name}: distance at other poses [mm]"), truth, others, Bound::AtMost(UNSEEN_MM));
+        let distance = format!("{name}: distance at other poses [m]");
+        case.claim(distance, truth, 1e-3 * others, Bound::AtMost(1e-3 * UNSEEN_MM));
         case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtLeast(COVERED[0]));
         case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtMost(COVERED[1]));
         let written = (own / reported - 1.0).abs();

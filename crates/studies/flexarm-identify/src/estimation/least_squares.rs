@@ -195,7 +195,8 @@ const DEPENDENT: f64 = 1e-12;
 const SETTLED: (f64, f64) = (1e-2, 0.1);
 /// Minimum error of the model relative to the scatter at the start.
 const MIN_ERROR: f64 = 1e-8;
-/// Minimum part of given standard deviations that the scatter can reduce them to.
+/// Minimum ratio of the scatter to given standard deviations for which these are reduced: numbers that
+/// scatter less are computed ones.
 const MIN_SHARE: f64 = 0.1;
 /// One-sided normal quantile for a probability of one in a thousand.
 const RARE_QUANTILE: f64 = 3.09;
@@ -331,8 +332,7 @@ impl<P: Residuals> Fit<'_, P> {
             let (old, freedom) = (total(self), some.len() as f64 - taken);
             let error = scatter(&some, freedom, self.search.loss) * correlated(&some);
             self.errors[kind] = error.max(self.least[kind]);
-            let share = |factor: f64| factor.clamp(MIN_SHARE, 1.0);
-            self.shares[kind] = misfit(&some, freedom, self.search.loss).map_or(1.0, share);
+            self.shares[kind] = misfit(&some, freedom, self.search.loss).map_or(1.0, |factor| factor.min(1.0));
             change = change.max((total(self) / old).ln().abs());
         }
         self.set_deviations();
@@ -536,7 +536,8 @@ pub(crate) fn misfit(rows: &[(f64, Noise)], freedom: f64, loss: Loss) -> Option<
     let over: Vec<f64> = rows.iter().map(|(r, noise)| r / noise.std).collect();
     let factor = scale(&over, freedom, loss);
     let [low, high] = chi_square_bounds(freedom);
-    (factor * factor > high || factor * factor < low).then_some(factor)
+    let square = factor * factor;
+    (square > high || (square < low && factor > MIN_SHARE)).then_some(factor)
 }
 
 /// Returns the lower and upper 0.1 % quantiles of χ² over its degrees of freedom (Wilson and
