@@ -29,8 +29,16 @@ impl NumberTable {
     /// has a row with a different number of cells or a cell that is not a number. The message gives
     /// the line, the column and what was found.
     pub fn read(path: &Path) -> Result<Self, FileError> {
+        Self::of_text(path, &read_text(path)?)
+    }
+
+    /// Reads the text of a file, whose path is used in messages.
+    ///
+    /// # Errors
+    /// As [`NumberTable::read`].
+    pub fn of_text(path: &Path, text: &str) -> Result<Self, FileError> {
         let unusable = |fault: TableFault| FileError::Unusable { path: path.to_owned(), what: fault.to_string() };
-        Self::parse(&read_text(path)?).map_err(unusable)
+        Self::parse(text).map_err(unusable)
     }
 
     fn parse(text: &str) -> Result<Self, TableFault> {
