@@ -29,7 +29,14 @@ impl NumberTable {
     /// names a column twice, or has a row with a different number of cells or a cell that is not a
     /// number.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        let text = read_text(path)?;
+        Self::of_text(path, &read_text(path)?)
+    }
+
+    /// Reads the text of a file, whose path is used in messages.
+    ///
+    /// # Errors
+    /// As [`NumberTable::read`].
+    pub fn of_text(path: &Path, text: &str) -> Result<Self, FileError> {
         let text = text.trim_start_matches('\u{feff}');
         let fault = |line: usize, column: Option<usize>, message: String| {
             let (path, column) = (path.to_owned(), column.unwrap_or(1));

@@ -199,7 +199,7 @@ pub mod recordings {
 
 /// Flexible links from meshes and from matrices of other programs.
 pub mod links {
-    pub use flexarm_linkmaker::{ImportError, JobError, LinkError, WordError, export, import};
+    pub use flexarm_linkmaker::{JobError, LinkError, WordError, export, import};
     pub use flexarm_run::reduce;
 }
 

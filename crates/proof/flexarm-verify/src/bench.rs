@@ -9,6 +9,7 @@ use flexarm::robots::TCP_FRAME;
 use flexarm::steppers::{ConstraintForm, SpookPreset, SpookSettings, Start};
 use flexarm::{LinkModel, Modelling, Motion, Robot, StepperKind};
 use flexarm_analysis::tcp_error;
+use flexarm_files::NumberTable;
 use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
 use flexarm_stepping::{
     AlphaSettings, Damping, Held, Load, Observation, Plant, PrescribedMotion, TimedWrench, new_stepper,
@@ -57,6 +58,17 @@ impl Bench {
     pub fn stored(&self, name: &str) -> Result<Stored, Error> {
         Stored::read(&self.root.join("tests/verification").join(name))
     }
+}
+
+/// Reads columns of a table.
+pub(crate) fn columns<const N: usize>(path: &Path, names: [&str; N]) -> Result<Vec<[f64; N]>, Error> {
+    let table = NumberTable::read(path)?;
+    let missing = |name: &str| flexarm::Error::File { path: path.to_owned(), what: format!("has no column {name:?}") };
+    let mut columns = [0; N];
+    for (column, name) in columns.iter_mut().zip(names) {
+        *column = table.column(name).ok_or_else(|| missing(name))?;
+    }
+    Ok(table.rows.iter().map(|row| columns.map(|column| row[column])).collect())
 }
 
 /// Results of another program, with their provenance.
@@ -189,7 +201,7 @@ impl Rig {
         let joints = vec![0.0; arm.model.n_actuated()];
         let plant = arm.plant(Arc::new(Held(joints))).map_err(step_error)?;
         let name = frame.unwrap_or(TCP_FRAME);
-        let known = || Error::NoFrame { name: name.to_owned() };
+        let known = || Error::Case(format!("there is no frame {name:?}"));
         let frame = plant.model.frame(name).ok_or_else(known)?.clone();
         let X_WF = place(&plant, &frame, &DVector::zeros(plant.model.n_elastic()));
         Ok(Self { plant, frame, X_WF })
@@ -269,7 +281,8 @@ impl Rig {
                 return Ok(before);
             }
         }
-        Err(Error::NotAtRest { steps: AT_MOST, step_s: h, stepper: kind.name() })
+        let stepper = kind.name();
+        Err(Error::Case(format!("the arm does not come to rest within {AT_MOST} steps of {h} s ({stepper})")))
     }
 
     /// Returns the displacement of the frame from its undeformed position after the arm is released
@@ -333,7 +346,7 @@ pub fn tool_path(
         link.damping = Damping::StiffnessProportional(PATH_DAMPING_S);
     }
     let plant = robot.model(modelling)?.plant(motion).map_err(step_error)?;
-    let frame = plant.model.frame(TCP_FRAME).ok_or(Error::NoTool)?.clone();
+    let frame = plant.model.frame(TCP_FRAME).ok_or_else(|| Error::Case("the robot has no tool".into()))?.clone();
     let mut stepper = new_stepper(ALPHA, plant.clone(), h, start).map_err(step_error)?;
     let mut seen = Observation::new(&plant);
     let mut path = Vec::new();

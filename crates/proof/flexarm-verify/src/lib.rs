@@ -99,12 +99,12 @@ impl Pace<'_> {
 /// Runs the named cases, or all if none is named.
 ///
 /// # Errors
-/// [`Error::UnknownCase`], [`flexarm::Error::File`] if files of the checkout are missing, and the
-/// errors of the individual cases.
+/// [`Error::Case`] for an unknown name, [`flexarm::Error::File`] if files of the checkout are
+/// missing, and the errors of the individual cases.
 pub fn verify(bench: &Bench, names: &[String], progress: &mut Progress<'_>) -> Result<Verification, Error> {
     if let Some(unknown) = names.iter().find(|name| !case_names().contains(&name.as_str())) {
         let known = case_names().join(", ");
-        return Err(Error::UnknownCase { name: unknown.clone(), known });
+        return Err(Error::Case(format!("there is no case {unknown:?}; the cases are {known}")));
     }
     let wanted: Vec<&Entry> =
         CASES.iter().filter(|(name, ..)| names.is_empty() || names.iter().any(|n| n == name)).collect();

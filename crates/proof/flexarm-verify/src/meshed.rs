@@ -103,7 +103,7 @@ impl Condensed<'_> {
     /// Motion of B (rows) under unit wrenches at B, with A held.
     pub(crate) fn compliance(&self) -> Result<Matrix6<f64>, Error> {
         let K: Matrix6<f64> = self.inner.stiffness().fixed_view::<6, 6>(6, 6).into();
-        inverse(&K).ok_or(Error::FreeInterface)
+        inverse(&K).ok_or_else(|| Error::Case("interface B can move without force".into()))
     }
 
     /// Motion of B under a uniform acceleration (m/s²), with A held.

@@ -1,7 +1,6 @@
 //! Errors of making or exporting a link, with cause and numbers, and whether the input or the run
 //! is at fault.
 
-mod import;
 mod job;
 mod word;
 
@@ -13,7 +12,6 @@ use flexarm_fem::sparse::ModesError;
 use flexarm_files::{FileError, TextFileError};
 use flexarm_settings::Fault;
 
-pub use import::ImportError;
 pub use job::JobError;
 pub use word::WordError;
 
@@ -33,9 +31,9 @@ pub enum LinkError {
     /// An invalid number or name in a job.
     #[error(transparent)]
     Job(#[from] JobError),
-    /// Invalid interface frames of an import.
-    #[error(transparent)]
-    ImportJob(#[from] ImportError),
+    /// No file of an import, or interface frames that do not match its matrices.
+    #[error("{0}")]
+    ImportJob(String),
     /// An invalid reduced-link file.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),

@@ -95,7 +95,7 @@ pub fn write_stress(fields: &StressFields) -> Vec<u8> {
 /// [`StressFileError`].
 pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
     let about = read_about(bytes)?;
-    let file = SafeTensors::deserialize(bytes).map_err(|e| StressFileError::Damaged { cause: e.to_string() })?;
+    let file = SafeTensors::deserialize(bytes).map_err(|e| StressFileError(format!("damaged: {e}")))?;
     let file = Tensors { file: &file };
     let (materials, poses) = (file.rows("materials", 3)?, file.rows("pose", 12)?);
     let frequencies_hz = file.numbers("frequency_hz")?;
@@ -105,7 +105,8 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
     let stress = file.stress(wrenches + INERTIA_LOADS + frequencies_hz.len(), sites.len())?;
     let compliance = file.compliance(wrenches)?;
     if about.interfaces.len() != poses.len() {
-        return Err(StressFileError::PoseCount { interfaces: about.interfaces.len(), poses: poses.len() });
+        let what = format!("{} interfaces have {} poses", about.interfaces.len(), poses.len());
+        return Err(StressFileError(what));
     }
     let pose = |row: &Vec<f64>| {
         let R = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&row[..9]));
@@ -128,19 +129,24 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
 /// Reads the description in the metadata.
 fn read_about(bytes: &[u8]) -> Result<About, StressFileError> {
     let (_, header) =
-        SafeTensors::read_metadata(bytes).map_err(|e| StressFileError::NotTensors { cause: e.to_string() })?;
+        SafeTensors::read_metadata(bytes).map_err(|e| StressFileError(format!("not a stress file: {e}")))?;
     let text = header.metadata().as_ref().and_then(|about| about.get(KEY));
-    let about: About =
-        text.and_then(|text| serde_json::from_str(text).ok()).ok_or(StressFileError::NoDescription { key: KEY })?;
+    let about = text.and_then(|text| serde_json::from_str(text).ok());
+    let missing = || StressFileError(format!("its metadata have no key {KEY:?} with format, link and interfaces"));
+    let about: About = about.ok_or_else(missing)?;
     if about.format != FORMAT {
-        return Err(StressFileError::Format { found: about.format, expected: FORMAT });
+        return Err(StressFileError(format!("format {:?}, expected {FORMAT:?}", about.format)));
     }
     Ok(about)
 }
 
 fn check_finite(numbers: &[f64]) -> Result<(), StressFileError> {
     let finite = numbers.iter().all(|number| number.is_finite());
-    if finite { Ok(()) } else { Err(StressFileError::ImpossibleNumber { largest: LARGEST }) }
+    if finite { Ok(()) } else { Err(impossible_number()) }
+}
+
+fn impossible_number() -> StressFileError {
+    StressFileError(format!("a number is not finite, or a stress beyond {LARGEST:e} Pa per unit"))
 }
 
 struct Tensors<'a> {
@@ -149,12 +155,12 @@ struct Tensors<'a> {
 
 impl<'a> Tensors<'a> {
     fn tensor(&self, name: &'static str, kind: Dtype) -> Result<TensorView<'a>, StressFileError> {
-        let tensor = self.file.tensor(name).map_err(|_| StressFileError::Missing { name })?;
+        let tensor = self.file.tensor(name).map_err(|_| StressFileError(format!("tensor {name:?} is missing")))?;
         if tensor.dtype() == kind {
             return Ok(tensor);
         }
-        let (found, expected) = (format!("{:?}", tensor.dtype()), format!("{kind:?}"));
-        Err(StressFileError::NumberType { name, found, expected })
+        let found = tensor.dtype();
+        Err(StressFileError(format!("tensor {name:?} has numbers of the type {found:?}, expected {kind:?}")))
     }
 
     fn numbers(&self, name: &'static str) -> Result<Vec<f64>, StressFileError> {
@@ -165,7 +171,8 @@ impl<'a> Tensors<'a> {
     fn rows(&self, name: &'static str, width: usize) -> Result<Vec<Vec<f64>>, StressFileError> {
         let tensor = self.tensor(name, Dtype::F64)?;
         if tensor.shape().len() != 2 || tensor.shape()[1] != width {
-            return Err(StressFileError::Rows { name, found: tensor.shape().to_vec(), width });
+            let found = tensor.shape();
+            return Err(StressFileError(format!("tensor {name:?} has the shape {found:?}, expected rows of {width}")));
         }
         Ok(self.numbers(name)?.chunks_exact(width).map(<[f64]>::to_vec).collect())
     }
@@ -184,10 +191,11 @@ impl<'a> Tensors<'a> {
         let (nodes, kinds, tied) = (self.whole("node")?, self.whole("material")?, self.numbers("from_tie")?);
         let sites = positions.len();
         if [nodes.len(), kinds.len(), tied.len()] != [sites; 3] {
-            return Err(StressFileError::SeatCounts { sites });
+            let what = format!("its tensors \"node\", \"material\", \"from_tie\" do not have {sites} entries");
+            return Err(StressFileError(what));
         }
         if kinds.iter().any(|kind| *kind >= materials as u64) {
-            return Err(StressFileError::IndexOutOfRange);
+            return Err(StressFileError("an index is out of range".into()));
         }
         positions.iter().try_for_each(|position| check_finite(position))?;
         let site = |k: usize| StressSite {
@@ -202,7 +210,7 @@ impl<'a> Tensors<'a> {
     fn triangles(&self, sites: usize) -> Result<Vec<[u32; 3]>, StressFileError> {
         let corners = self.whole("triangle")?;
         if corners.iter().any(|site| *site >= sites as u64) {
-            return Err(StressFileError::IndexOutOfRange);
+            return Err(StressFileError("an index is out of range".into()));
         }
         Ok(corners.as_chunks().0.iter().map(|corners| corners.map(|site| site as u32)).collect())
     }
@@ -212,11 +220,12 @@ impl<'a> Tensors<'a> {
         let tensor = self.tensor("stress", Dtype::F32)?;
         let expected = [fields, sites, 6];
         if tensor.shape() != expected {
-            return Err(StressFileError::StressShape { found: tensor.shape().to_vec(), expected });
+            let found = tensor.shape();
+            return Err(StressFileError(format!("tensor \"stress\" has the shape {found:?}, expected {expected:?}")));
         }
         let stress: Vec<f32> = tensor.data().as_chunks().0.iter().map(|word| f32::from_le_bytes(*word)).collect();
         if !stress.iter().all(|stress| stress.abs() < LARGEST) {
-            return Err(StressFileError::ImpossibleNumber { largest: LARGEST });
+            return Err(impossible_number());
         }
         Ok(DMatrix::from_vec(6 * sites, fields, stress))
     }
@@ -226,7 +235,7 @@ impl<'a> Tensors<'a> {
         let numbers = self.numbers("compliance")?;
         let (found, expected) = (numbers.len(), wrenches * wrenches);
         if found != expected || wrenches == 0 {
-            return Err(StressFileError::ComplianceSize { found, expected });
+            return Err(StressFileError(format!("tensor \"compliance\" has {found} entries, expected {expected}")));
         }
         check_finite(&numbers)?;
         Ok(DMatrix::from_vec(wrenches, wrenches, numbers))

@@ -8,12 +8,9 @@ mod slider_crank;
 mod swept_rotor;
 mod two_link;
 
-use std::path::Path;
-
 use flexarm::recordings::Trace;
 use flexarm::steppers::ConstraintForm;
 use flexarm::{Keep, Modelling, Motion, Robot, RunOptions, RunRequest, StepperKind};
-use flexarm_files::NumberTable;
 use nalgebra::Vector2;
 
 use crate::bench::{ALPHA, Bench, spook};
@@ -79,17 +76,6 @@ impl Method {
         let request = RunRequest::keeping(Keep::Curves);
         Ok(robot.model(&self.modelling)?.simulate_with(motion, &options, request)?.trace)
     }
-}
-
-/// Reads columns of a table; the first one is the time.
-fn columns<const N: usize>(path: &Path, names: [&str; N]) -> Result<Vec<[f64; N]>, Error> {
-    let table = NumberTable::read(path)?;
-    let missing = |name: &str| flexarm::Error::File { path: path.to_owned(), what: format!("has no column {name:?}") };
-    let mut columns = [0; N];
-    for (column, name) in columns.iter_mut().zip(names) {
-        *column = table.column(name).ok_or_else(|| missing(name))?;
-    }
-    Ok(table.rows.iter().map(|row| columns.map(|column| row[column])).collect())
 }
 
 /// Checks that a run has the samples of its truth.

@@ -3,9 +3,9 @@
 use flexarm::{LoadOptions, RobotSource};
 use nalgebra::Vector2;
 
-use super::{FOLDER, Method, columns, in_plane, same_times};
+use super::{FOLDER, Method, in_plane, same_times};
 use crate::Error;
-use crate::bench::{Bench, Worst, in_modes, in_parts};
+use crate::bench::{Bench, Worst, columns, in_modes, in_parts};
 
 /// Length of the crank (m).
 const CRANK_M: f64 = 0.15;

@@ -10,9 +10,9 @@ use std::path::{Path, PathBuf};
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, ReduceOutputs, reduce};
 use flexarm::{Modelling, Robot};
 
-use super::{FOLDER, columns};
+use super::FOLDER;
 use crate::Error;
-use crate::bench::Bench;
+use crate::bench::{Bench, columns};
 
 /// One inch (m).
 const INCH: f64 = 0.0254;

@@ -2,9 +2,9 @@
 
 use nalgebra::Vector2;
 
-use super::{FOLDER, Method, columns, in_plane, same_times};
+use super::{FOLDER, Method, in_plane, same_times};
 use crate::Error;
-use crate::bench::{Bench, Worst, in_modes, in_parts};
+use crate::bench::{Bench, Worst, columns, in_modes, in_parts};
 
 /// Step size (s) and samples per second.
 pub(super) const STEP_S: f64 = 2e-4;

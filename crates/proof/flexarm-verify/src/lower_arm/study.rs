@@ -41,7 +41,10 @@ impl FlangeLoads {
         Ok(Self {
             truth: truth.C,
             programs: programs.iter().map(program).collect(),
-            link_file: Method { name: "link file".into(), C: filed.ok_or(Error::SingularLink)? },
+            link_file: Method {
+                name: "link file".into(),
+                C: filed.ok_or_else(|| Error::Case("K_BB of the link file is singular".into()))?,
+            },
             methods: by_every_method(robot, B, &loads, SETTLING_STEP_S, &others)?,
         })
     }

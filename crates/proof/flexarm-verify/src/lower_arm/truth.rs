@@ -31,8 +31,8 @@ impl Truth {
     pub(super) fn filed(robot: &Robot, hz: Vec<f64>) -> Result<Self, Error> {
         let reduced = &robot.flexible_links[0].flexible.reduced;
         let element = reduced.details.as_ref().and_then(|details| details.superelement.as_ref());
-        let element = element.ok_or(Error::NoCondensedMass)?;
-        let C = inverse(&reduced.K_BB).ok_or(Error::SingularLink)?;
+        let element = element.ok_or_else(|| Error::Case("the link file has no condensed mass".into()))?;
+        let C = inverse(&reduced.K_BB).ok_or_else(|| Error::Case("K_BB of the link file is singular".into()))?;
         let sag = [0, 1, 2].map(|axis| {
             // Both interfaces accelerate alike; the mass matrix gives the resulting load at B.
             let load = element.M.column(axis) + element.M.column(6 + axis);

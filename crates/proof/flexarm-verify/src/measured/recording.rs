@@ -2,6 +2,7 @@
 
 use flexarm::Robot;
 use flexarm_fe_io::unpack_gzip;
+use flexarm_files::NumberTable;
 
 use crate::Error;
 use crate::bench::Bench;
@@ -49,10 +50,13 @@ impl Recording {
         let packed = std::fs::read(&path).map_err(|e| fail(format!("the recording cannot be read: {e}")))?;
         let bytes = unpack_gzip(&packed).map_err(|e| fail(e.to_string()))?;
         let text = String::from_utf8(bytes).map_err(|e| fail(format!("is no text: {e}")))?;
-        let unusable = |error: TableError| fail(error.to_string());
-        let table = Table::new(&text).map_err(unusable)?;
+        let table = NumberTable::of_text(&path, &text)?;
+        let column = |name: &str| -> Result<Vec<f64>, Error> {
+            let column = table.column(name).ok_or_else(|| fail(format!("has no column {name:?}")))?;
+            Ok(table.rows.iter().map(|row| row[column]).collect())
+        };
         let all = |name: fn(usize) -> String, count: usize| -> Result<Vec<Vec<f64>>, Error> {
-            (1..=count).map(|axis| table.column(&name(axis)).map_err(unusable)).collect()
+            (1..=count).map(|axis| column(&name(axis))).collect()
         };
         let motor = all(|k| format!("q_motor_{k}_rad"), AXES)?;
         let low = LowPass::new(SMOOTH_HZ, 1.0 / STEP_S);
@@ -66,7 +70,7 @@ impl Recording {
         let q = smooth(&motor);
         let v = slopes(&q);
         Ok(Self {
-            time_s: table.column("time_s").map_err(unusable)?,
+            time_s: column("time_s")?,
             reference: all(|k| format!("q_ref_{k}_rad"), AXES)?,
             link: all(|k| format!("q_link_{k}_rad"), WITH_ENCODER)?,
             smooth_torque: smooth(&torque),
@@ -91,59 +95,5 @@ impl Recording {
     /// Values of all joints at one sample.
     pub(super) fn at(&self, of: &[Vec<f64>], sample: usize) -> Vec<f64> {
         of.iter().map(|axis| axis[sample]).collect()
-    }
-}
-
-/// Reason why a text is not the table of a recording.
-#[derive(Debug, thiserror::Error)]
-enum TableError {
-    #[error("line {line}: {cell:?} is no number")]
-    NoNumber { line: usize, cell: String },
-    #[error("line {line} has {found} cells, expected {expected}")]
-    Cells { line: usize, found: usize, expected: usize },
-    #[error("has no column {name:?}")]
-    NoColumn { name: String },
-}
-
-/// Columns of numbers with their names.
-struct Table<'a> {
-    names: Vec<&'a str>,
-    rows: Vec<Vec<f64>>,
-}
-
-impl<'a> Table<'a> {
-    fn new(text: &'a str) -> Result<Self, TableError> {
-        let mut lines = text.lines();
-        let names: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
-        let row = |(text, line): (&str, usize)| {
-            let number = |cell: &str| cell.parse().map_err(|_| TableError::NoNumber { line, cell: cell.to_owned() });
-            let row: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
-            match (row.len(), names.len()) {
-                (found, expected) if found != expected => Err(TableError::Cells { line, found, expected }),
-                _ => Ok(row),
-            }
-        };
-        let rows = lines.zip(2..).map(row).collect::<Result<_, _>>()?;
-        Ok(Self { names, rows })
-    }
-
-    fn column(&self, name: &str) -> Result<Vec<f64>, TableError> {
-        let place = self.names.iter().position(|other| *other == name);
-        let place = place.ok_or_else(|| TableError::NoColumn { name: name.to_owned() })?;
-        Ok(self.rows.iter().map(|row| row[place]).collect())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_table_is_read_by_names_and_its_faults_have_lines() {
-        let table = Table::new("t,q\n0,1.5\n1,2.5\n").unwrap();
-        assert_eq!(table.column("q").unwrap(), [1.5, 2.5]);
-        assert!(table.column("x").is_err());
-        assert!(Table::new("t,q\n0,x\n").err().unwrap().to_string().contains("line 2"));
-        assert!(Table::new("t,q\n0,1\n2\n").err().unwrap().to_string().contains("line 3"));
     }
 }

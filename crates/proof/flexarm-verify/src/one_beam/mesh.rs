@@ -84,7 +84,11 @@ impl BarMesh {
         interfaces.extend(STATIONS_M.map(|x| fe.section(x)));
         let condensation = fe.condense(&interfaces)?;
         let (K, held) = (condensation.stiffness(), 6 * (interfaces.len() - 1));
-        let C = K.view((6, 6), (held, held)).into_owned().try_inverse().ok_or(Error::Mechanism { mesh: MESH })?;
+        let C = K
+            .view((6, 6), (held, held))
+            .into_owned()
+            .try_inverse()
+            .ok_or_else(|| Error::Case(format!("{MESH}: the held mesh is a mechanism")))?;
         let own = Matrix6::from_fn(|i, j| C[(i, j)]);
         let others = [in_parts(9), in_modes(ALL_MODES)];
         let against_own = |theory: Stiffness| {
@@ -178,7 +182,7 @@ impl MeshWeight {
         let bare = without_ball(meshed);
         let held = condensation
             .held_modes(ModesWanted::Count(MODES))
-            .map_err(|source| Error::Modes { mesh: MESH, source })?
+            .map_err(|error| Error::Case(format!("{MESH}: {error}")))?
             .frequencies_hz();
         let sag_m = [stored.vector6("gravity/-z")?[2], stored.vector6("gravity/-y")?[1]];
         let hz = stored.numbers("frequencies_hz")?;

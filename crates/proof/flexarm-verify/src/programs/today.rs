@@ -9,7 +9,7 @@ use flexarm_stepping::Damping;
 use nalgebra::Vector3;
 
 use crate::Error;
-use crate::bench::{ALPHA, Bench, Worst, larger, spook};
+use crate::bench::{ALPHA, Bench, Worst, columns, larger, spook};
 
 const ROBOT: &str = "robots/kr210/links.toml";
 pub(super) const MOTION: &str = "pick_and_place";
@@ -112,53 +112,15 @@ struct Curve {
     peak: f64,
 }
 
-/// A row of the truth that is not one.
-#[derive(Debug, thiserror::Error)]
-#[error("row {row:?}: expected seven finite numbers")]
-struct RowError {
-    row: String,
-}
-
 impl Curve {
     fn read(path: &Path) -> Result<Self, Error> {
-        let fail = |what: String| flexarm::Error::File { path: path.to_owned(), what };
-        let text = std::fs::read_to_string(path).map_err(|error| fail(format!("cannot be read: {error}")))?;
-        Ok(Self::parse(&text).map_err(|error| fail(error.to_string()))?)
-    }
-
-    /// Parses rows of time, rigid and flexible TCP, below a header; lines starting with `#` are
-    /// notes.
-    fn parse(text: &str) -> Result<Self, RowError> {
-        let rows = text.lines().filter(|line| !line.starts_with('#')).skip(1);
+        let names = ["rigid_x", "rigid_y", "rigid_z", "flexible_x", "flexible_y", "flexible_z"];
         let (mut flexible, mut peak) = (Vec::new(), 0.0f64);
-        for row in rows {
-            let values: Option<Vec<f64>> = row.split(',').map(|word| word.trim().parse().ok()).collect();
-            let values = values
-                .filter(|v| v.len() == 7 && v.iter().all(|x| x.is_finite()))
-                .ok_or_else(|| RowError { row: row.to_owned() })?;
-            let (rigid, tool) = (Vector3::from_column_slice(&values[1..4]), Vector3::from_column_slice(&values[4..7]));
-            peak = larger(peak, (tool - rigid).norm());
+        for [x, y, z, flexible_x, flexible_y, flexible_z] in columns(path, names)? {
+            let tool = Vector3::new(flexible_x, flexible_y, flexible_z);
+            peak = larger(peak, (tool - Vector3::new(x, y, z)).norm());
             flexible.push(tool);
         }
         Ok(Self { flexible, peak })
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Truth by hand: the TCPs differ by (3, 4, 0) and (0, 0, 1).
-    #[test]
-    fn a_stored_curve_is_read_with_its_peak_and_refused_with_its_row() {
-        let text = "# note\nt,x,y,z,a,b,c\n0, 1,1,1, 4,5,1\n1, 0,0,0, 0,0,1\n";
-        let curve = Curve::parse(text).expect("well formed");
-        assert_eq!((curve.flexible.len(), curve.peak), (2, 5.0));
-        assert_eq!(curve.flexible[0], Vector3::new(4.0, 5.0, 1.0));
-        for (good, bad) in [("0,0,1\n", "0,0\n"), ("0,0,1\n", "0,0,NaN\n"), ("0,0,1\n", "0,0,x\n")] {
-            let refused =
-                Curve::parse(&text.replace(good, bad)).err().map(|error| error.to_string()).unwrap_or_default();
-            assert!(refused.contains("expected seven finite numbers") && refused.contains(bad.trim()), "{refused}");
-        }
     }
 }

@@ -43,7 +43,7 @@ use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
 use crate::robot_entry::robot_entry;
-use crate::{ImportError, LinkError, Stopwatch, stamp};
+use crate::{LinkError, Stopwatch, stamp};
 use summary::Parts;
 
 pub use flexarm_fe_io::exchange::MatrixNames as Names;
@@ -145,7 +145,7 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
         check_apart(&targets.all(), &inputs)?;
         check_free(&targets.all(), targets.overwrite)?;
     }
-    let first = job.files.first().ok_or(ImportError::NoFile)?;
+    let first = job.files.first().ok_or_else(|| LinkError::ImportJob("no file to import is given".into()))?;
     let head = InputFile::open(first).map_err(Box::new)?;
     let (reduction, parts) = if recognise(&head.bytes) == Some(MatrixFormat::Sid) {
         expect_format(job, MatrixFormat::Sid, &head.origin)?;
@@ -427,10 +427,11 @@ fn place(
     }
     for (k, at) in job.at.iter().enumerate() {
         if !names.contains(&at.name) {
-            return Err(ImportError::UnknownInterface { interface: at.name.clone(), known: names }.into());
+            let what = format!("{} names interface {:?}, the map has {names:?}", Setting::At, at.name);
+            return Err(LinkError::ImportJob(what));
         }
         if job.at[..k].iter().any(|other| other.name == at.name) {
-            return Err(ImportError::FrameTwice { interface: at.name.clone() }.into());
+            return Err(LinkError::ImportJob(format!("{} {}=... is given twice", Setting::At, at.name)));
         }
     }
     let mut placed = Vec::new();
@@ -456,7 +457,9 @@ fn place(
         placed.push(one);
     }
     if (placed[0].xyz - placed[1].xyz).norm() == 0.0 {
-        return Err(ImportError::SamePoint { first: names[0].clone(), second: names[1].clone() }.into());
+        let [first, second] = [0, 1].map(|k| &names[k]);
+        let what = format!("interfaces {first:?} and {second:?} are at the same point; a link needs a length");
+        return Err(LinkError::ImportJob(what));
     }
     Ok(placed)
 }

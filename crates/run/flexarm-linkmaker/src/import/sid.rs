@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, Matrix6, Rotation3, Translation3, Vector3};
 use super::summary::{ImportInterface, Parts};
 use super::words::ImportMap;
 use super::{ImportJob, SECOND_ORDER_UNKNOWN, plan, rotation};
-use crate::{ImportError, LinkError};
+use crate::LinkError;
 
 pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
     let sid = parse_sid(&String::from_utf8_lossy(&file.bytes), &file.origin).map_err(Box::new)?;
@@ -89,7 +89,11 @@ fn layout(job: &ImportJob, origin: &str, ids: &[i64]) -> Result<(UnitSystem, Vec
     let nodes = nodes.map_err(|error| faults.push(refuse(error.to_string()))).ok();
     let (Some(units), Some(nodes)) = (job.units, nodes) else { return Err(LinkError::of_all(faults)) };
     match job.at.first() {
-        Some(at) => Err(ImportError::FrameOfSid { interface: at.name.clone() }.into()),
+        Some(given) => {
+            let (at, name) = (Setting::At, &given.name);
+            let what = format!("{at} {name}=...: the positions are in the SID file; leave {at} out");
+            Err(LinkError::ImportJob(what))
+        }
         None => Ok((units, nodes)),
     }
 }

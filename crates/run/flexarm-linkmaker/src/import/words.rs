@@ -39,7 +39,7 @@ impl FromStr for ImportMap {
         let parts = split_outside_brackets(text);
         let values = || parts.iter().filter_map(|part| part.split_once('=').map(|(_, value)| value));
         if !values().any(is_nodes) {
-            return text.parse().map(Self::Rows).map_err(|error| WordError::Rows(Box::new(error)));
+            return text.parse().map(Self::Rows).map_err(|error| WordError(error.to_string()));
         }
         let one = |part: &&str| {
             let wrong = || WordError::form(part, "NAME=plane(x,y,z;nx,ny,nz) for every interface");
@@ -48,14 +48,14 @@ impl FromStr for ImportMap {
             let (point, normal) = inside.split_once(';').ok_or_else(wrong)?;
             let (point, normal) = (triple(point)?, triple(normal)?);
             if normal.norm() == 0.0 {
-                return Err(WordError::NoNormal { text: (*part).to_owned() });
+                return Err(WordError(format!("{part:?}: the normal of the plane is zero")));
             }
             Ok((name.trim().to_owned(), NodePlane { point, normal }))
         };
         let list: Vec<(String, NodePlane)> = parts.iter().map(one).collect::<Result<_, _>>()?;
         for (k, (name, _)) in list.iter().enumerate() {
             if list[..k].iter().any(|(other, _)| other == name) {
-                return Err(WordError::NameTwice { name: name.clone() });
+                return Err(WordError(format!("the name {name:?} is used twice in the map")));
             }
         }
         Ok(Self::Nodes(list))
@@ -226,7 +226,7 @@ pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, WordError> {
 /// [`WordError`].
 pub fn parse_split(text: &str) -> Result<SplitAt, WordError> {
     let expected = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or x,y,z";
-    let wrong = || WordError::ImportSplit { text: text.to_owned(), expected };
+    let wrong = || WordError(format!("split {text:?}: expected {expected}"));
     match text.trim() {
         "elastic-centre" | "elastic-center" => Ok(SplitAt::ElasticCentre),
         "mid" => Ok(SplitAt::MidLength),

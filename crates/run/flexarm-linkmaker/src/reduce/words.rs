@@ -25,12 +25,13 @@ pub(crate) const MATERIAL_FORMS: &str =
 
 impl MaterialChoice {
     fn named(name: &str) -> Result<Self, WordError> {
-        let unknown = || match (Material::suggestion(name), name.to_owned()) {
-            (Some(meant), name) => WordError::MisspeltMaterial { name, meant },
-            (None, name) => WordError::Material { name },
-        };
-        let (name, material) = Material::preset(name).ok_or_else(unknown)?;
+        let (name, material) = Material::preset(name).ok_or_else(|| Self::unknown(name))?;
         Ok(Self { name: Some(name), material })
+    }
+
+    fn unknown(name: &str) -> WordError {
+        let meant = Material::suggestion(name).map_or_else(String::new, |meant| format!("; did you mean {meant:?}?"));
+        WordError(format!("material {name:?} is not known; expected {MATERIAL_FORMS}{meant}"))
     }
 
     fn given([young, nu, rho]: [f64; 3]) -> Result<Self, WordError> {
@@ -47,7 +48,7 @@ impl FromStr for MaterialChoice {
         if !text.contains(',') {
             return Self::named(text.trim());
         }
-        Self::given(<[f64; 3]>::try_from(numbers(text)?).map_err(|_| WordError::Material { name: text.to_owned() })?)
+        Self::given(<[f64; 3]>::try_from(numbers(text)?).map_err(|_| Self::unknown(text))?)
     }
 }
 
@@ -116,7 +117,7 @@ pub(crate) const SPLIT_FORMS: &str =
 impl SplitChoice {
     fn fraction(x: f64) -> Result<Self, WordError> {
         let inside = x.is_finite() && (0.0..=1.0).contains(&x);
-        inside.then_some(Self::Fraction(x)).ok_or(WordError::Fraction { found: x })
+        inside.then_some(Self::Fraction(x)).ok_or_else(|| WordError(format!("split is {x}; expected {SPLIT_FORMS}")))
     }
 }
 
@@ -124,7 +125,7 @@ impl FromStr for SplitChoice {
     type Err = WordError;
 
     fn from_str(text: &str) -> Result<Self, WordError> {
-        let wrong = || WordError::Split { text: text.to_owned() };
+        let wrong = || WordError(format!("split {text:?} is not known; expected {SPLIT_FORMS}"));
         match text.trim() {
             "elastic-centre" | "elastic-center" => Ok(Self::ElasticCentre),
             "mid" => Ok(Self::Mid),
@@ -228,11 +229,11 @@ pub enum At {
 /// Parses finite numbers separated by commas.
 ///
 /// # Errors
-/// [`WordError::NotFinite`].
+/// [`WordError`].
 pub fn numbers(text: &str) -> Result<Vec<f64>, WordError> {
     let number = |word: &str| {
         let value = word.parse().ok().filter(|x: &f64| x.is_finite());
-        value.ok_or_else(|| WordError::NotFinite { word: word.to_owned(), text: text.to_owned() })
+        value.ok_or_else(|| WordError(format!("{word:?} in {text:?} is not a finite number")))
     };
     text.split(',').map(str::trim).map(number).collect()
 }
