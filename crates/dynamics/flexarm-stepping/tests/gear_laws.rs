@@ -9,7 +9,6 @@ use flexarm_stepping::*;
 fn sliders_follow_rayleighs_law_and_lose_the_area_of_masings_loop() {
     let (friction, reach) = (30.0, 2e-4);
     let law = |count: usize| Hysteresis {
-        element: 0,
         elastic: TorqueCurve::straight(4e5),
         sliders: Hysteresis::even_sliders(friction, reach, count),
     };

@@ -1,7 +1,7 @@
 //! Model exchange: the arm as a differential equation, against its stepper and its linear model.
 
 use crate::helpers::{changed_kr210, of_joints, robot, settings, targets, values};
-use flexarm::{DriveModel, LinkModel, Modelling, Robot};
+use flexarm::{DriveModel, LinkModel, Robot};
 use flexarm_fmu::{FmuError, FmuModel, FmuSettings};
 use nalgebra::DMatrix;
 

@@ -59,7 +59,7 @@ fn parts(segments: usize) -> Modelling {
 fn a_held_beam_bears_the_bending_stress_of_its_weight_and_load_at_its_root() {
     let beam = Beam::new("statics", str::to_owned);
     for segments in [2, 8] {
-        let held = statics(&beam.robot(), &parts(segments), Some(&[0.3]), [0.0; 6]).unwrap();
+        let held = beam.robot().model(&parts(segments)).unwrap().statics(Some(&[0.3]), [0.0; 6]).unwrap();
         let link = &held.stress[0];
         let truth = 9.81 * (0.5 * 0.8 + 1.728 * 0.4) * 0.02 / (0.02 * 0.04_f64.powi(3) / 12.0);
         let off = link.peak_pa / truth - 1.0;
@@ -114,7 +114,7 @@ fn stress_of_a_beam_is_computed_only_if_it_is_asked_for_and_there_is_an_outline(
 
     let rigid = Modelling { links: LinkModel::Rigid, ..Modelling::default() };
     let stiff = Beam::new("rigid", str::to_owned);
-    assert!(statics(&stiff.robot(), &rigid, None, [0.0; 6]).unwrap().stress.is_empty());
+    assert!(stiff.robot().model(&rigid).unwrap().statics(None, [0.0; 6]).unwrap().stress.is_empty());
     let modal = Modelling { links: LinkModel::Modal, ..Modelling::default() };
     let run = Beam::new("modal", str::to_owned).swing(modal);
     let caveat = run.summary.caveats.iter().find(|caveat| caveat.code == "no-stress").unwrap();
@@ -128,7 +128,7 @@ fn the_section_forces_of_a_held_beam_are_shear_and_moment_of_the_weight_beyond_e
     let beam = Beam::new("section forces", str::to_owned);
     let (g, m, tip, l) = (9.81, 1.728, 0.5, 0.8);
     for segments in [2, 8] {
-        let held = statics(&beam.robot(), &parts(segments), Some(&[0.3]), [0.0; 6]).unwrap();
+        let held = beam.robot().model(&parts(segments)).unwrap().statics(Some(&[0.3]), [0.0; 6]).unwrap();
         let planes = &held.stress[0].section_forces;
         assert_eq!((planes.len(), planes[20].at_m), (21, l));
         let mut off = [0.0_f64; 2];
