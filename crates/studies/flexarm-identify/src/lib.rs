@@ -91,12 +91,6 @@ pub fn link_entries(arm: &Arm) -> Vec<Parameter> {
     candidates_that(arm, parameters::is_entry)
 }
 
-/// Returns the parameters of the TCP, `tcp.x` to `tcp.rz`: translation and rotation about its own
-/// axes (m, rad).
-pub fn tcp_parameters(arm: &Arm) -> Vec<Parameter> {
-    candidates_that(arm, parameters::is_tool)
-}
-
 /// Returns the displacements of the joint frames, `joint.JOINT.x` to `.roll`, and the zeros of the
 /// joints, `joint.JOINT.zero` (m, rad).
 pub fn frame_parameters(arm: &Arm) -> Vec<Parameter> {

@@ -220,3 +220,57 @@ fn a_wrong_sign_a_zero_off_by_a_right_angle_and_mirrored_axes_are_named() {
         assert!(error.contains(words), "{error}");
     }
 }
+
+/// Joint, parent, origin of an arm whose upper arm is driven by a parallelogram.
+const BARS: [(&str, &str, [f64; 3]); 5] = [
+    ("yaw", "base", [0.0, 0.0, 0.3]),
+    ("lower", "yaw", [0.1, 0.0, 0.2]),
+    ("crank", "yaw", [0.1, 0.0, 0.2]),
+    ("upper", "lower", [0.0, -0.6, 0.0]),
+    ("rod", "crank", [-0.2, 0.0, 0.0]),
+];
+
+/// Truth: an arm with a parallelogram, of which two axes are off its plane, without noise.
+#[test]
+fn frames_of_a_loop_are_fitted_off_its_plane_and_the_written_file_is_read_again() {
+    let place = Place::new("loop");
+    let mut urdf = "<robot name=\"loop\">\n<link name=\"base\"/>\n".to_owned();
+    for (name, parent, [x, y, z]) in BARS {
+        let roll = if parent == "yaw" { -std::f64::consts::FRAC_PI_2 } else { 0.0 };
+        let _ = writeln!(
+            urdf,
+            "<link name=\"{name}\"/><joint name=\"{name}\" type=\"revolute\"><parent link=\"{parent}\"/>\
+             <child link=\"{name}\"/><origin xyz=\"{x} {y} {z}\" rpy=\"{roll} 0 0\"/><axis xyz=\"0 0 1\"/>\
+             <limit lower=\"-3\" upper=\"3\" effort=\"500\" velocity=\"2\"/></joint>"
+        );
+    }
+    place.write("loop.urdf", &(urdf + "</robot>\n"));
+    let robot = |name: &str, more: &str| {
+        let text = "format = 1\nurdf = \"loop.urdf\"\ntcp = { link = \"upper\" }\n[[loop]]\n\
+                    pin = { link = \"upper\", xyz = [-0.2, 0.0, 0.0] }\neye = { link = \"rod\", xyz = [0.0, -0.6, 0.0] }\n\
+                    dependent = [\"upper\", \"rod\"]\n";
+        Robot::load(place.write(name, &(text.to_owned() + more))).unwrap()
+    };
+    let off = "[[calibration]]\njoint = \"lower\"\nrpy = [0.006, -0.004, 0.0]\n\
+               [[calibration]]\njoint = \"crank\"\nrpy = [-0.005, 0.0, 0.003]\n";
+    let arm = robot("truth.toml", off).model(&Modelling::default()).unwrap();
+    let (mut at, mut draw) = (arm.operating_point().unwrap(), Draw(9));
+    let mut text = "yaw,lower,crank,x,y,z\n".to_owned();
+    for _ in 0..24 {
+        let q = [1.5, 0.4, 0.4].map(|range| range * draw.signed());
+        at.solve(&q, &Wrench::zeros()).unwrap();
+        let X = instrument() * at.pose_of(arm.model.frame("upper").unwrap());
+        let p = X.rotation * Vector3::new(0.7, 0.1, 0.05) + X.translation.vector;
+        let cells = q.iter().chain(&p).map(|x| format!("{x:?}"));
+        text += &(cells.collect::<Vec<_>>().join(",") + "\n");
+    }
+    place.write("places.csv", &text);
+    let job = "format = 1\nfit = [\"joint.lower.*\", \"joint.crank.*\"]\n[instrument.camera]\n[target.ball]\n\
+               xyz = [0.7, 0.1, 0.05]\n[[place]]\nfile = \"places.csv\"\nstd = 1e-5\n";
+    let request = IdentifyRequest { output: Some(place.0.join("out")), overwrite: true, ..IdentifyRequest::default() };
+    let found = identify_robot(&robot("guess.toml", ""), &place.write("job.toml", job), &request).unwrap();
+    eprintln!("residual {:.1e} m, before {:.1e} m", found.residual.after, found.residual.before);
+    assert!(found.residual.before > 1e-4 && found.residual.after < 1e-6, "{:?}", found.residual);
+    let written = Robot::load(place.0.join("out")).unwrap();
+    assert_eq!(written.calibration.len(), 2);
+}

@@ -400,7 +400,7 @@ impl<P: Residuals> Fit<'_, P> {
             let mut J = DMatrix::zeros(0, 0);
             match evaluated(self.problem, &moved, &mut J) {
                 Ok(r) if self.cost(&r, &moved) <= cost * (1.0 + 1e-14) => {
-                    // Where the residuals curve, steps without damping pass the minimum again and again.
+                    // Steps without damping pass the minimum again and again if the residuals curve.
                     let factor = match (cost - self.cost(&r, &moved)) / expected {
                         gain if gain > GAIN.0 => 0.1,
                         gain if gain < GAIN.1 => 10.0,
