@@ -60,7 +60,6 @@ pub use summary::{
 pub(crate) use summary::{about, coarse, rows3, rows6};
 pub use urdf_link::{LinkJoint, UrdfLink};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
-pub(crate) use words::{MATERIAL_FORMS, SPLIT_FORMS};
 
 /// Default number of modes to keep.
 const MODES: usize = 10;
