@@ -6,9 +6,9 @@ use crate::place::TextPosition;
 
 /// Faults, warnings and notes about one file.
 #[derive(Default)]
-pub struct Report {
+pub(crate) struct Report {
     /// Errors.
-    pub issues: Vec<Finding>,
+    pub(crate) issues: Vec<Finding>,
     /// Links with an issue that can be waived.
     pub(crate) waivable: Vec<String>,
     /// Warnings and notes.

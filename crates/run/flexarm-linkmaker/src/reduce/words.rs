@@ -20,7 +20,7 @@ pub struct MaterialChoice {
 }
 
 /// Notations of a material, for messages.
-pub(crate) const MATERIAL_FORMS: &str =
+pub(super) const MATERIAL_FORMS: &str =
     "steel, aluminium, cast_iron, ductile_iron, or E,nu,rho in SI such as 70e9,0.33,2700 (Pa, -, kg/m3)";
 
 impl MaterialChoice {
@@ -111,8 +111,7 @@ pub enum SplitChoice {
 }
 
 /// Notations of a split, for messages.
-pub(crate) const SPLIT_FORMS: &str =
-    "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or a point x,y,z";
+const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or a point x,y,z";
 
 impl SplitChoice {
     fn fraction(x: f64) -> Result<Self, WordError> {
