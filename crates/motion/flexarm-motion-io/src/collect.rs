@@ -156,6 +156,28 @@ impl<'a> Collector<'a> {
         Ok(())
     }
 
+    /// Checks that a requested topic holds messages that can be read.
+    fn check_topic(&self, asked: &str) -> Result<(), PlacedProblem> {
+        let asked_for = |topic: &&Topic| same_topic(asked, &topic.name);
+        let others: Vec<String> =
+            self.topics.iter().filter(|topic| topic.reader.is_some()).map(Topic::described).collect();
+        let fail = |what: &str| {
+            Err(PlacedProblem::new(format!(
+                "the topic {asked:?} ({}) {what}; topics with motions are {readable}",
+                Setting::Topic,
+                readable = joined(&others)
+            )))
+        };
+        match self.topics.iter().find(asked_for) {
+            None => fail("is not in the file"),
+            Some(topic) if topic.reader.is_none() => {
+                fail(&format!("has messages of the type {}, which hold no motion", topic.message))
+            }
+            Some(topic) if topic.count == 0 => fail("has no messages"),
+            Some(_) => Ok(()),
+        }
+    }
+
     /// Returns the selected topic and others that could be selected.
     ///
     /// # Errors
@@ -166,26 +188,7 @@ impl<'a> Collector<'a> {
         let readable = |topics: &[Topic]| -> Vec<String> {
             topics.iter().filter(|topic| topic.has_motion()).map(Topic::described).collect()
         };
-        if let Some(asked) = self.request.topic {
-            let asked_for = |topic: &&Topic| same_topic(asked, &topic.name);
-            let others: Vec<String> =
-                self.topics.iter().filter(|topic| topic.reader.is_some()).map(Topic::described).collect();
-            let fail = |what: &str| {
-                Err(PlacedProblem::new(format!(
-                    "the topic {asked:?} ({}) {what}; topics with motions are {readable}",
-                    Setting::Topic,
-                    readable = joined(&others)
-                )))
-            };
-            match self.topics.iter().find(asked_for) {
-                None => return fail("is not in the file"),
-                Some(topic) if topic.reader.is_none() => {
-                    return fail(&format!("has messages of the type {}, which hold no motion", topic.message));
-                }
-                Some(topic) if topic.count == 0 => return fail("has no messages"),
-                Some(_) => {}
-            }
-        }
+        self.request.topic.map_or(Ok(()), |asked| self.check_topic(asked))?;
         // Preference: most moving joints, then measured before commanded motion, then most
         // messages.
         let rank = |topic: &Topic| {

@@ -10,6 +10,10 @@ use flexarm_trajectory::TrajectoryError;
 pub(crate) const NO_POSITIONS: &str =
     "expected a position for each joint; ros2 topic echo prints them all with --full-length";
 
+/// Problem of an array that the program which printed it shortened (`...`) or left out.
+pub(crate) const SHORTENED_ARRAY: &str =
+    "an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)";
+
 /// Error of reading a motion.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

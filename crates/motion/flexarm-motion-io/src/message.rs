@@ -3,7 +3,7 @@
 
 use std::rc::Rc;
 
-use crate::error::{NO_POSITIONS, PlacedProblem};
+use crate::error::{NO_POSITIONS, PlacedProblem, SHORTENED_ARRAY};
 use crate::value::{Node, Value};
 
 /// Maximum depth of a motion in a message.
@@ -292,11 +292,7 @@ fn wrong(key: &str, node: &Node, expected: &'static str) -> PlacedProblem {
     if let Value::Text(text) = &node.value
         && (text.contains("...") || text.starts_with("<sequence type:") || text.starts_with("<array type:"))
     {
-        return PlacedProblem::at(
-            node.line,
-            "an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without \
-             --no-arr)",
-        );
+        return PlacedProblem::at(node.line, SHORTENED_ARRAY);
     }
     PlacedProblem::at(node.line, format!("`{key}` is {found}; expected {expected}", found = node.in_words()))
 }

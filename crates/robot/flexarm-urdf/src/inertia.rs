@@ -189,6 +189,16 @@ fn tell_massless(robot: &RawRobot, massless: Vec<(&str, Finding)>, report: &mut 
     report.warning(&robot.place, "missing-inertial", message, &massless[0].1.help);
 }
 
+/// Remedy for a moving link without `<inertial>`.
+fn estimate_help() -> String {
+    format!(
+        "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in \
+         the robot file): without them the link needs no force to move, and nothing bends under it",
+        Setting::InertiaFromDensity,
+        Setting::InertiaFromTotalMass
+    )
+}
+
 /// Checks mass and inertia of a moving body; returns its link and a warning if they are missing
 /// entirely.
 fn check_body<'r>(
@@ -218,13 +228,7 @@ fn check_body<'r>(
             report.error(&root.place, code, message, help);
             return None;
         }
-        let help = format!(
-            "add <inertial> with mass and inertia, or have it estimated from the meshes ({} or {}, or such keys in \
-             the robot file): without them the link needs no force to move, and nothing bends under it",
-            Setting::InertiaFromDensity,
-            Setting::InertiaFromTotalMass
-        );
-        return Some((link, Finding::warning(code, root.place.to_string(), message, help)));
+        return Some((link, Finding::warning(code, root.place.to_string(), message, estimate_help())));
     }
     // Unreadable or negative masses were reported already; consequences are not.
     let unsound = |&i: &usize| robot.links[i].inertial.as_ref().is_some_and(|raw| raw.faulty || raw.mass < 0.0);

@@ -2,7 +2,6 @@
 
 use flexarm_analysis::{InversionError, LinearError, ShaperError};
 use flexarm_run::ExternalError;
-use flexarm_stepping::TargetError;
 
 /// An error of compensating a motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -110,12 +110,11 @@ fn grid_region<'m>(
     let mut finder = Finder::new(model, tcp_frame(model), near.to_vec());
     let joints = finder.joints();
     if joints < 6 {
-        return Err(MapError::Input(format!(
-            "the arm has {joints} joints, but reaching a TCP pose requires six: map it over joint \
-                 values ({})",
+        let message = format!(
+            "the arm has {joints} joints, but reaching a TCP pose requires six: map it over joint values ({})",
             Setting::MapJoints
-        ))
-        .into());
+        );
+        return Err(MapError::Input(message).into());
     }
     let mut caveats = Vec::new();
     if !finder.is_closed() {
@@ -130,12 +129,12 @@ fn grid_region<'m>(
     let grid = Grid::within(bounds, spacing)?;
     let queries = grid.places() as f64 * directions as f64;
     if queries > MAX_QUERIES {
-        return Err(MapError::Input(format!(
-            "the map would search for {queries:.1e} TCP poses, at most {MAX_QUERIES:.0e} are allowed: \
-                 use fewer directions, or increase {}",
+        let message = format!(
+            "the map would search for {queries:.1e} TCP poses, at most {MAX_QUERIES:.0e} are allowed: use fewer \
+             directions, or increase {}",
             Setting::GridSpacing
-        ))
-        .into());
+        );
+        return Err(MapError::Input(message).into());
     }
     Ok((Region::Grid(grid, Box::new(finder), found), caveats))
 }
@@ -162,12 +161,12 @@ fn joint_region<'m>(
             return Err(MapError::Input(format!("joint {joint:?} is named twice")).into());
         }
         if !first.is_finite() || !last.is_finite() || *points == 0 {
-            return Err(MapError::Input(format!(
-                "joint {joint:?} has a range from {} to {} in {points} values: expected finite numbers and \
-                     at least one value",
+            let message = format!(
+                "joint {joint:?} has a range from {} to {} in {points} values: expected finite numbers and at least \
+                 one value",
                 range.range[0], range.range[1]
-            ))
-            .into());
+            );
+            return Err(MapError::Input(message).into());
         }
         Quantity::JOINT.check_all(&format!("joint {joint:?}"), &range.range)?;
         let limits = actuated[k].limits;

@@ -43,7 +43,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use flexarm_kinematics::Model;
-use flexarm_settings::Words;
+use flexarm_settings::{Setting, Words};
 use serde::Serialize;
 
 pub use columns::MapColumn;

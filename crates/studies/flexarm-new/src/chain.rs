@@ -113,20 +113,25 @@ impl<'a> Tree<'a> {
     }
 }
 
+/// Error about a robot without a joint that has its own coordinate and a range to move in.
+fn no_movable_joint(mechanism: &Mechanism) -> NewError {
+    let robot = &mechanism.name;
+    let why = match mechanism.joints.len() {
+        0 => "it has no joints at all".to_owned(),
+        1 => "its only joint is fixed, a mimic joint or without range".to_owned(),
+        n => format!("all of its {n} joints are fixed, mimic joints or without range"),
+    };
+    NewError(format!(
+        "robot {robot:?} has no joint that moves: {why}; an arm needs at least one joint of type revolute, \
+         continuous or prismatic whose lower limit is below its upper one"
+    ))
+}
+
 /// Returns the requested chain, or else the longest one that is an arm.
 pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewError> {
     let tree = Tree::new(mechanism);
     if !mechanism.joints.iter().any(is_free) {
-        let robot = &mechanism.name;
-        let why = match mechanism.joints.len() {
-            0 => "it has no joints at all".to_owned(),
-            1 => "its only joint is fixed, a mimic joint or without range".to_owned(),
-            n => format!("all of its {n} joints are fixed, mimic joints or without range"),
-        };
-        return Err(NewError(format!(
-            "robot {robot:?} has no joint that moves: {why}; an arm needs at least one joint of type revolute, \
-             continuous or prismatic whose lower limit is below its upper one"
-        )));
+        return Err(no_movable_joint(mechanism));
     }
     let root = tree.root().unwrap_or_default().to_owned();
     let known = |link: &String| {

@@ -35,7 +35,6 @@ mod text;
 use flexarm_run::ExternalError;
 use std::path::Path;
 
-use flexarm_settings::Setting;
 use flexarm_urdf::ReadOptions;
 
 use flexarm_run::motion_report::motion_report;

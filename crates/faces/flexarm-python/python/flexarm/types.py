@@ -42,7 +42,6 @@ __all__ = [
     "ImportChecks",
     "ImportFiles",
     "ImportInterface",
-    "ImportPart",
     "ImportSummary",
     "IndexFigures",
     "Inspection",
@@ -1323,7 +1322,7 @@ class Identification(TypedDict):
     held_out: HeldOutFigures | None
     """RMS of cross-validation residuals; null with fewer than two readings."""
     misfit: float | None
-    """Ratio of the scatter to the declared one if chance does not explain it; otherwise null."""
+    """Ratio of the scatter to the declared one, above or below 1, if chance does not explain it; otherwise null."""
     deviations_known: bool
     """Whether the deviations of all readings were given; the others are estimated from the scatter."""
     model_errors: list[ModelError]
@@ -1966,17 +1965,6 @@ class ImportInterface(_ImportInterfaceFrom):
     """Roll, pitch, yaw of the frame."""
 
 
-class ImportPart(TypedDict):
-    """A rigid part."""
-
-    mass_kg: float
-    """Mass."""
-    com_m: list[float]
-    """Centre of mass."""
-    inertia: list[list[float]]
-    """Inertia about the centre of mass, 3×3 (kg m²)."""
-
-
 class ImportChecks(TypedDict):
     """Results of the checks; relative unless the key has a unit."""
 
@@ -2036,7 +2024,7 @@ class ImportSummary(TypedDict):
     """Inverse of the stiffness."""
     split_m: list[float]
     """Position of the elastic joint between the two parts."""
-    parts: list[ImportPart]
+    parts: list[PartFigures]
     """The two rigid parts, proximal first."""
     frequencies_hz: list[float]
     """Natural frequencies with A held and B free (Hz); empty without a mass matrix or modes."""

@@ -139,9 +139,7 @@ pub(crate) fn hysteresis(
         one_of([("lost_motion", entry.lost_motion), ("lost_motion_arcmin", entry.lost_motion_arcmin)], ARCMIN)?;
     let elastic = match (curve, lost_motion, entry.rated_torque) {
         (Some(_), Some(_), _) => {
-            return Err(
-                "hysteresis with lost_motion takes a stiffness, not backlash or a curve, which say the same".into()
-            );
+            return Err("hysteresis with lost_motion takes a stiffness: backlash and a curve say the same".into());
         }
         (None, Some(_), None) => {
             return Err("hysteresis needs the rated_torque (N m) to which its lost_motion belongs".into());

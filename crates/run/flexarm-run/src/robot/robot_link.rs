@@ -179,13 +179,12 @@ impl RobotLink {
 
     fn modal(&self, modelling: &Modelling) -> Result<ModalLink, (RequestedKey, String)> {
         let name = &self.flexible.link;
-        let link = name;
         let fail =
             |asked: RequestedKey| move |source: FemError| (asked, format!("link {name:?} cannot be modal: {source}"));
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MAX_MODES) {
             let error = format!(
-                "link {link:?}: {modes} modes are requested, at most {MAX_MODES} are allowed: the work of a step \
+                "link {name:?}: {modes} modes are requested, at most {MAX_MODES} are allowed: the work of a step \
                  grows with the cube of their number, and those beyond the first dozen are far above what a drive or \
                  a tool excites"
             );
@@ -205,24 +204,18 @@ impl RobotLink {
                     let element = details?.superelement.as_ref()?;
                     Some(ModalLink::from_superelement(name, element).map_err(fail(RequestedKey::Model)))
                 };
-                let no_mass = || {
-                    (
-                        RequestedKey::Model,
-                        format!(
-                            "link {link:?} cannot be modal: its .flex file has no mass over interfaces and modes; \
-                             reduce the mesh again with this version, or use model = \"lumped\""
-                        ),
-                    )
-                };
-                let modal = stored.or_else(condensed).ok_or_else(no_mass)??;
+                let no_mass = format!(
+                    "link {name:?} cannot be modal: its .flex file has no mass over interfaces and modes; reduce the \
+                     mesh again with this version, or use model = \"lumped\""
+                );
+                let modal = stored.or_else(condensed).ok_or((RequestedKey::Model, no_mass))??;
                 let stored = modal.coordinates().saturating_sub(6 * modal.interfaces.len());
                 match wanted {
                     Some(n) if n < stored => modal.truncated(n).map_err(fail(RequestedKey::Modes))?,
                     Some(modes) if modes > stored => {
-                        return Err((
-                            RequestedKey::Modes,
-                            format!("link {link:?}: {modes} modes are requested, its .flex file has {stored}"),
-                        ));
+                        let message =
+                            format!("link {name:?}: {modes} modes are requested, its .flex file has {stored}");
+                        return Err((RequestedKey::Modes, message));
                     }
                     _ => modal,
                 }
@@ -230,7 +223,7 @@ impl RobotLink {
         };
         if self.choices.geometric && full.geometric.is_none() {
             let message = format!(
-                "link {link:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
+                "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",
                 Setting::Geometric
             );
             return Err((RequestedKey::Geometric, message));
