@@ -271,7 +271,7 @@ pub fn sensitivity(
 fn chosen<T>(mut all: Vec<T>, patterns: &[String], name: impl Fn(&T) -> &str) -> Result<Vec<T>, Error> {
     for pattern in patterns {
         if !all.iter().any(|own| fits(pattern, name(own))) {
-            let names: Vec<String> = all.iter().map(|own| name(own).to_owned()).collect();
+            let names: Vec<_> = all.iter().map(&name).collect();
             let message = format!(
                 "no parameter is called {pattern:?}: expected some of {}, * for anything; an entry of a lumped \
                  link's 6x6 is link.LINK.stiffness[i][j], i and j from 0 to 5",
