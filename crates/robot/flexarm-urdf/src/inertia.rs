@@ -210,7 +210,7 @@ fn check_body<'r>(
     options: &ReadOptions,
     report: &mut Report,
 ) -> Option<(&'r str, Finding)> {
-    let joint = &robot.joints[body.moved_by?].name;
+    let joint = &robot.joints[body.moved_by?].urdf.name;
     let root = &robot.links[body.root];
     let link = &root.name;
     let lumped = match &body.members[1..] {
@@ -412,7 +412,8 @@ const ROD: f64 = 0.2;
 /// Approximates a link by a rod of 1 kg/m from its frame to its farthest joint; `None` for a link
 /// without length.
 fn rod(robot: &RawRobot, link: usize) -> Option<SpatialInertia> {
-    let ends = robot.joints.iter().filter(|j| j.parent == robot.links[link].name).map(|j| j.X_PJ.translation.vector);
+    let ends =
+        robot.joints.iter().filter(|j| j.urdf.parent.link == robot.links[link].name).map(|j| j.X_PJ.translation.vector);
     let end = ends.max_by(|a, b| a.norm().total_cmp(&b.norm())).filter(|end| end.norm() > 1e-3)?;
     let (length, along) = (end.norm(), end.normalize());
     let (across, about) = (length.powi(3) / 12.0 * (1.0 + 0.75 * ROD * ROD), length.powi(3) * ROD * ROD / 8.0);

@@ -4,7 +4,9 @@ use std::collections::HashMap;
 
 use flexarm_kinematics::{Joint, JointKind, Limits, Mimic, Pose};
 use nalgebra::{Rotation3, Translation3, Unit, Vector3};
+use urdf_rs::JointType;
 
+use crate::lint::RATES;
 use crate::place::TextPosition;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::{Report, did_you_mean, quoted};
@@ -17,30 +19,32 @@ const UNIT_TOLERANCE: f64 = 1e-4;
 /// is constant.
 pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
     let mut still: HashMap<String, f64> =
-        robot.joints.iter().filter(|j| j.is_fixed()).map(|j| (j.name.clone(), 0.0)).collect();
+        robot.joints.iter().filter(|j| j.is_fixed()).map(|j| (j.urdf.name.clone(), 0.0)).collect();
     for joint in robot.joints.iter_mut().filter(|j| j.is_fixed()) {
-        if joint.mimic.take().is_some() {
-            let message = format!("joint {:?} is fixed: its <mimic> is ignored", joint.name);
-            report.warning(&joint.mimic_place, "mimic-fixed", message, "remove <mimic>, or let the joint move");
+        if joint.urdf.mimic.take().is_some() {
+            let message = format!("joint {:?} is fixed: its <mimic> is ignored", joint.urdf.name);
+            report.warning(&joint.mimic, "mimic-fixed", message, "remove <mimic>, or let the joint move");
         }
     }
     // Each round fixes followers of joints fixed in an earlier round.
     loop {
-        let follows = |j: &&mut RawJoint| j.mimic.as_ref().is_some_and(|m| still.contains_key(&m.joint));
+        let follows = |j: &&mut RawJoint| j.urdf.mimic.as_ref().is_some_and(|m| still.contains_key(&m.joint));
         let Some(joint) = robot.joints.iter_mut().find(follows) else { return };
-        let Some(mimic) = joint.mimic.take() else { return };
+        let Some(mimic) = joint.urdf.mimic.take().map(follower) else { return };
         let value = mimic.ratio * still.get(&mimic.joint).copied().unwrap_or(0.0) + mimic.offset;
-        if let Some(axis) = Unit::try_new(joint.axis, 1e-12) {
-            joint.X_PJ *= match joint.kind {
-                "prismatic" => Pose::from_parts(Translation3::from(axis.into_inner() * value), Rotation3::identity()),
+        if let Some(axis) = Unit::try_new(Vector3::from(*joint.urdf.axis.xyz), 1e-12) {
+            joint.X_PJ *= match joint.urdf.joint_type {
+                JointType::Prismatic => {
+                    Pose::from_parts(Translation3::from(axis.into_inner() * value), Rotation3::identity())
+                }
                 _ => Pose::from_parts(Translation3::identity(), Rotation3::from_axis_angle(&axis, value)),
             };
         }
         let message =
-            format!("joint {:?} follows {:?}, which is fixed: it is fixed at {value}", joint.name, mimic.joint);
-        report.warning(&joint.mimic_place, "mimic-fixed", message, "remove <mimic>, or let the leader move");
-        joint.kind = "fixed";
-        still.insert(joint.name.clone(), value);
+            format!("joint {:?} follows {:?}, which is fixed: it is fixed at {value}", joint.urdf.name, mimic.joint);
+        report.warning(&joint.mimic, "mimic-fixed", message, "remove <mimic>, or let the leader move");
+        joint.urdf.joint_type = JointType::Fixed;
+        still.insert(joint.urdf.name.clone(), value);
     }
 }
 
@@ -57,36 +61,50 @@ pub(crate) fn convert_joints(robot: &RawRobot, report: &mut Report) -> Vec<Joint
 }
 
 fn convert(raw: &RawJoint, report: &mut Report) -> Joint {
-    let mut joint = Joint::new(&raw.name, JointKind::Fixed, &raw.parent, &raw.child, raw.X_PJ);
-    joint.kind = match raw.kind {
-        "revolute" => JointKind::Revolute(axis(raw, report)),
-        "prismatic" => JointKind::Prismatic(axis(raw, report)),
-        "continuous" => JointKind::Continuous(axis(raw, report)),
+    let urdf = &raw.urdf;
+    let mut joint = Joint::new(&urdf.name, JointKind::Fixed, &urdf.parent.link, &urdf.child.link, raw.X_PJ);
+    let kind = match urdf.joint_type {
+        JointType::Revolute => {
+            joint.kind = JointKind::Revolute(axis(raw, report));
+            "revolute"
+        }
+        JointType::Prismatic => {
+            joint.kind = JointKind::Prismatic(axis(raw, report));
+            "prismatic"
+        }
+        JointType::Continuous => {
+            joint.kind = JointKind::Continuous(axis(raw, report));
+            "continuous"
+        }
         // The lint reports the other types.
         _ => return joint,
     };
     match &raw.limit {
-        Some((place, values)) => joint.limits = limits(raw, place, *values, report),
-        None if raw.kind == "continuous" => {}
+        Some(place) => joint.limits = limits(raw, place, report),
+        None if kind == "continuous" => {}
         None => {
-            let message = format!("{} joint {:?} has no <limit>", raw.kind, raw.name);
-            let or = if raw.kind == "revolute" { " or make the joint continuous" } else { "" };
+            let message = format!("{kind} joint {:?} has no <limit>", urdf.name);
+            let or = if kind == "revolute" { " or make the joint continuous" } else { "" };
             let help = format!("add <limit lower=\"..\" upper=\"..\" effort=\"..\" velocity=\"..\"/>{or}");
             report.error(&raw.place, "missing-limit", message, help);
         }
     }
-    joint.mimic = raw.mimic.clone();
+    joint.mimic = urdf.mimic.clone().map(follower);
     joint
 }
 
+fn follower(urdf: urdf_rs::Mimic) -> Mimic {
+    Mimic { joint: urdf.joint, ratio: urdf.multiplier.unwrap_or(1.0), offset: urdf.offset.unwrap_or(0.0) }
+}
+
 fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
-    let name = &raw.name;
-    let Some(place) = &raw.axis_place else {
+    let name = &raw.urdf.name;
+    let Some(place) = &raw.axis else {
         let message = format!("joint {name:?} has no <axis>; by URDF's rule that is x");
         report.note(&raw.place, "default-axis", message, "write the axis");
         return Vector3::x_axis();
     };
-    let Some((unit, norm)) = Unit::try_new_and_get(raw.axis, 1e-12) else {
+    let Some((unit, norm)) = Unit::try_new_and_get(Vector3::from(*raw.urdf.axis.xyz), 1e-12) else {
         if !raw.faulty {
             let message = format!("joint {name:?}: the axis is the zero vector");
             report.error(place, "zero-axis", message, "write the axis as a unit vector, such as xyz=\"0 0 1\"");
@@ -100,17 +118,18 @@ fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
     unit
 }
 
-fn limits(raw: &RawJoint, place: &TextPosition, values: [f64; 7], report: &mut Report) -> Limits {
-    let name = &raw.name;
-    let [lower, upper, effort, velocity, acceleration, deceleration, jerk] = values;
+fn limits(raw: &RawJoint, place: &TextPosition, report: &mut Report) -> Limits {
+    let (name, limit) = (&raw.urdf.name, &raw.urdf.limit);
     let mut limits = Limits::NONE;
-    if raw.kind != "continuous" {
-        (limits.lower, limits.upper) = (lower, upper);
-        if lower > upper {
+    if raw.urdf.joint_type != JointType::Continuous {
+        limits.lower = limit.lower;
+        limits.upper = limit.upper;
+        if limits.lower > limits.upper {
+            let Limits { lower, upper, .. } = limits;
             let message = format!("joint {name:?}: the lower limit {lower} is above the upper limit {upper}");
             report.error(place, "limits-reversed", message, "exchange lower and upper; angles are in radians");
-        } else if lower == upper && !raw.faulty {
-            let message = format!("joint {name:?} cannot move: both limits are {lower}");
+        } else if limits.lower == limits.upper && !raw.faulty {
+            let message = format!("joint {name:?} cannot move: both limits are {}", limits.lower);
             report.warning(place, "no-range", message, "give lower and upper, or make the joint fixed");
         }
     }
@@ -125,12 +144,12 @@ fn limits(raw: &RawJoint, place: &TextPosition, values: [f64; 7], report: &mut R
         }
         if value > 0.0 { value } else { f64::INFINITY }
     };
-    limits.effort = magnitude("effort", "unknown-effort", effort);
-    limits.velocity = magnitude("velocity", "unknown-velocity", velocity);
-    let acceleration = magnitude("acceleration", "unknown-acceleration", acceleration);
-    let deceleration = magnitude("deceleration", "unknown-deceleration", deceleration);
-    limits.jerk = magnitude("jerk", "unknown-jerk", jerk);
+    limits.effort = magnitude("effort", "unknown-effort", limit.effort);
+    limits.velocity = magnitude("velocity", "unknown-velocity", limit.velocity);
+    let codes = ["unknown-acceleration", "unknown-deceleration", "unknown-jerk"];
+    let [acceleration, deceleration, jerk] = [0, 1, 2].map(|k| magnitude(RATES[k], codes[k], raw.rates[k]));
     limits.acceleration = acceleration.min(deceleration);
+    limits.jerk = jerk;
     if acceleration != deceleration {
         let message = format!(
             "joint {name:?}: acceleration {acceleration} and deceleration {deceleration} differ; both are bounded by the smaller"
@@ -158,35 +177,35 @@ fn join_mimic_chains(joints: &mut [Joint]) {
 
 /// Checks that the leaders of mimic joints exist and do not form a cycle.
 fn check_mimics(robot: &RawRobot, report: &mut Report) {
-    let joints: HashMap<&str, &RawJoint> = robot.joints.iter().map(|j| (j.name.as_str(), j)).collect();
+    let joints: HashMap<&str, &RawJoint> = robot.joints.iter().map(|j| (j.urdf.name.as_str(), j)).collect();
     let mut in_reported_circle: Vec<&str> = Vec::new();
     for joint in &robot.joints {
         // An empty name was already reported as a missing attribute.
-        let Some(mimic) = joint.mimic.as_ref().filter(|m| !m.joint.is_empty()) else { continue };
+        let Some(mimic) = joint.urdf.mimic.as_ref().filter(|m| !m.joint.is_empty()) else { continue };
         let Some(leader) = joints.get(mimic.joint.as_str()) else {
-            let message = format!("joint {:?} mimics {:?}, which does not exist", joint.name, mimic.joint);
-            let meant = closest(&mimic.joint, robot.joints.iter().map(|j| j.name.as_str()));
+            let message = format!("joint {:?} mimics {:?}, which does not exist", joint.urdf.name, mimic.joint);
+            let meant = closest(&mimic.joint, robot.joints.iter().map(|j| j.urdf.name.as_str()));
             let help = did_you_mean(meant, "correct the name or define it");
-            report.error(&joint.mimic_place, "unknown-mimic", message, help);
+            report.error(&joint.mimic, "unknown-mimic", message, help);
             continue;
         };
-        if in_reported_circle.contains(&joint.name.as_str()) {
+        if in_reported_circle.contains(&joint.urdf.name.as_str()) {
             continue;
         }
-        let mut circle = vec![joint.name.as_str()];
+        let mut circle = vec![joint.urdf.name.as_str()];
         let mut at = *leader;
-        while let Some(next) = &at.mimic {
-            if let Some(start) = circle.iter().position(|n| *n == at.name) {
+        while let Some(next) = &at.urdf.mimic {
+            if let Some(start) = circle.iter().position(|n| *n == at.urdf.name) {
                 // A joint that follows the cycle without being in it is not another fault.
                 if start == 0 {
                     let joints = quoted(circle.iter().copied());
                     let message = format!("the joints {joints} mimic each other in a circle");
-                    report.error(&joint.mimic_place, "mimic-cycle", message, "let one of them go without <mimic>");
+                    report.error(&joint.mimic, "mimic-cycle", message, "let one of them go without <mimic>");
                     in_reported_circle.extend(&circle);
                 }
                 break;
             }
-            circle.push(&at.name);
+            circle.push(&at.urdf.name);
             let Some(leader) = joints.get(next.joint.as_str()) else { break };
             at = leader;
         }

@@ -33,7 +33,7 @@
 //!
 //! let wrong = text.replace("link=\"rod\"", "link=\"rd\"");
 //! let findings = check_urdf_text(&wrong, "pendulum.urdf", &ReadOptions::default());
-//! assert_eq!(findings[0].location, "pendulum.urdf:11:3");
+//! assert_eq!(findings[0].location, "pendulum.urdf:11:4");
 //! assert_eq!(findings[0].help, "did you mean \"rod\"?");
 //! # Ok::<(), flexarm_urdf::UrdfError>(())
 //! ```
@@ -82,7 +82,10 @@ pub use transmission::Transmission;
 /// Parts that the tests of this crate reach; not part of the interface.
 #[doc(hidden)]
 pub mod internals {
+    pub use crate::lint::lint;
     pub use crate::mesh::{Loaded, decode, load_with_remarks};
+    pub use crate::report::Report;
     pub use crate::xacro::macros::parameters;
     pub use crate::xacro::process::fits;
+    pub use crate::xml::Lines;
 }

@@ -7,9 +7,8 @@ use flexarm_settings::Finding;
 
 use crate::error::UrdfError;
 use crate::geometry::Visual;
-use crate::lint::lint;
 use crate::mesh::UpAxis;
-use crate::raw::RawRobot;
+use crate::raw::{RawRobot, read_robot};
 use crate::report::{Report, position};
 use crate::resolve::Resolver;
 use crate::tcp::tcp_candidates;
@@ -220,7 +219,7 @@ fn parse_expanded(
     report: &mut Report,
 ) -> Result<UrdfRobot, UrdfError> {
     let document = xml::parse(text, &lines).map_err(|issue| report.issues.push(*issue)).ok();
-    let raw = document.as_ref().and_then(|document| lint(document.root_element(), &lines, report));
+    let raw = document.as_ref().and_then(|document| read_robot(document.root_element(), &lines, report));
     let robot = raw.map(|mut raw| {
         raw.idle_macros = idle_macros.to_vec();
         joints::fix_still_followers(&mut raw, report);
@@ -278,7 +277,10 @@ fn assemble(
         tcp_candidates,
         warnings: Vec::new(),
         dynamics: moving
-            .map(|j| JointDynamics { joint: j.name.clone(), damping: j.damping, friction: j.friction })
+            .map(|j| {
+                let (damping, friction) = j.urdf.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
+                JointDynamics { joint: j.urdf.name.clone(), damping, friction }
+            })
             .collect(),
         transmissions: raw.transmissions.clone(),
         mechanism,

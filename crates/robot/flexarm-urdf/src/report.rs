@@ -6,9 +6,9 @@ use crate::place::TextPosition;
 
 /// Faults, warnings and notes about one file.
 #[derive(Default)]
-pub(crate) struct Report {
+pub struct Report {
     /// Errors.
-    pub(crate) issues: Vec<Finding>,
+    pub issues: Vec<Finding>,
     /// Links with an issue that can be waived.
     pub(crate) waivable: Vec<String>,
     /// Warnings and notes.

@@ -6,11 +6,12 @@ use std::rc::Rc;
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Point3, Vector3};
+use urdf_rs::Geometry as Shape;
 
 use crate::geometry::{Geometry, Visual};
 use crate::mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_with_remarks};
 use crate::place::TextPosition;
-use crate::raw::{RawMaterial, RawRobot, RawVisual};
+use crate::raw::{RawRobot, RawVisual, color};
 use crate::report::Report;
 use crate::resolve::Resolver;
 
@@ -52,13 +53,14 @@ pub(crate) fn find_visuals(
     let mut visuals = Vec::new();
     for link in &robot.links {
         for raw in &link.visuals {
-            let color = |(name, own): &RawMaterial| own.or_else(|| robot.materials.get(name).copied());
+            let material = raw.urdf.material.as_ref();
+            let named = || robot.materials.get(&material?.name).copied();
             visuals.push(Visual {
                 link: link.name.clone(),
                 X_LV: raw.X_LV,
                 geometry: geometry(raw, &link.name, resolver, up_axis, report),
-                color: raw.material.as_ref().and_then(color),
-                name: raw.name.clone(),
+                color: material.and_then(color).or_else(named),
+                name: raw.urdf.name.clone(),
             });
         }
     }
@@ -74,22 +76,27 @@ pub(crate) fn find_collisions(robot: &RawRobot, resolver: &Resolver<'_>, up_axis
         X_LV: raw.X_LV,
         geometry: geometry(raw, &link.name, resolver, up_axis, &mut unheard),
         color: None,
-        name: raw.name.clone(),
+        name: raw.urdf.name.clone(),
     };
     of_link.map(shape).collect()
 }
 
 fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, up_axis: UpAxis, report: &mut Report) -> Geometry {
-    let mut geometry = raw.geometry.clone();
-    if let Geometry::Mesh { uri, path, up_axis: axis, .. } = &mut geometry {
-        *axis = up_axis;
-        let found = resolver.resolve(uri).map_err(|not_found| {
-            let message = format!("link {link:?}: no mesh for {uri:?}: {}", not_found.reason);
-            report.warning(&raw.place, "missing-mesh", message, not_found.help);
-        });
-        *path = found.ok();
+    match &raw.urdf.geometry {
+        Shape::Box { size } => Geometry::Box { size: Vector3::from(**size) },
+        Shape::Cylinder { radius, length } => Geometry::Cylinder { radius: *radius, length: *length },
+        Shape::Capsule { radius, length } => Geometry::Capsule { radius: *radius, length: *length },
+        Shape::Sphere { radius } => Geometry::Sphere { radius: *radius },
+        Shape::Mesh { filename, scale } => {
+            let uri = filename.trim();
+            let path = resolver.resolve(uri).map_err(|not_found| {
+                let message = format!("link {link:?}: no mesh for {uri:?}: {}", not_found.reason);
+                report.warning(&raw.place, "missing-mesh", message, not_found.help);
+            });
+            let scale = scale.map_or(Vector3::repeat(1.0), |scale| Vector3::from(*scale));
+            Geometry::Mesh { uri: uri.to_owned(), path: path.ok(), scale, up_axis }
+        }
     }
-    geometry
 }
 
 /// Bounds and mass properties of every link's shapes; `visuals` are those of [`find_visuals`].

@@ -27,7 +27,7 @@ pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
         report.error(&robot.place, "no-link", format!("the robot {:?} has no <link>{macros}", robot.name), help);
     }
     let links = robot.links.iter().map(|link| ("link", "duplicate-link", &link.name, &link.place));
-    let joints = robot.joints.iter().map(|joint| ("joint", "duplicate-joint", &joint.name, &joint.place));
+    let joints = robot.joints.iter().map(|joint| ("joint", "duplicate-joint", &joint.urdf.name, &joint.place));
     let mut first: HashMap<(&str, &str), &TextPosition> = HashMap::new();
     for (kind, code, name, place) in links.chain(joints) {
         if let Some(first) = first.get(&(kind, name.as_str())) {
@@ -44,21 +44,21 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
     let names: HashSet<&str> = robot.links.iter().map(|l| l.name.as_str()).collect();
     let mut parent_joint: HashMap<&str, &RawJoint> = HashMap::new();
     for joint in &robot.joints {
-        for (role, link) in [("parent", &joint.parent), ("child", &joint.child)] {
+        for (role, link) in [("parent", &joint.urdf.parent.link), ("child", &joint.urdf.child.link)] {
             // An empty name was already reported as a missing element.
             if !link.is_empty() && !names.contains(link.as_str()) {
-                let message = format!("joint {:?}: its {role} link {link:?} does not exist", joint.name);
+                let message = format!("joint {:?}: its {role} link {link:?} does not exist", joint.urdf.name);
                 let meant = closest(link, robot.links.iter().map(|l| l.name.as_str()));
                 let help = did_you_mean(meant, "correct the name or define it");
                 report.error(&joint.place, "unknown-link", message, help);
             }
         }
-        let child = &joint.child;
+        let child = &joint.urdf.child.link;
         if child.is_empty() {
             continue;
         }
         if let Some(first) = parent_joint.get(child.as_str()) {
-            let (first, place, second) = (&first.name, &first.place, &joint.name);
+            let (first, place, second) = (&first.urdf.name, &first.place, &joint.urdf.name);
             let message = format!("link {child:?} is the child of two joints, {first:?} ({place}) and {second:?}");
             let help = "URDF describes trees: remove one of the joints; a closed loop is described with <mimic>";
             report.error(&joint.place, "two-parents", message, help);
@@ -69,7 +69,9 @@ pub(crate) fn check_tree(robot: &RawRobot, report: &mut Report) {
     report_cycles(robot, &parent_joint, report);
 
     // A broken joint leaves unconnected parts, which are not another fault.
-    if report.issues.len() > faults || robot.joints.iter().any(|j| j.parent.is_empty() || j.child.is_empty()) {
+    if report.issues.len() > faults
+        || robot.joints.iter().any(|j| j.urdf.parent.link.is_empty() || j.urdf.child.link.is_empty())
+    {
         return;
     }
     let roots: Vec<_> = robot.links.iter().filter(|l| !parent_joint.contains_key(l.name.as_str())).collect();
@@ -95,16 +97,16 @@ fn report_cycles(robot: &RawRobot, parent_joint: &HashMap<&str, &RawJoint>, repo
             }
             if let Some(&start) = on_path.get(at) {
                 if !reported.contains(&at) {
-                    let joints = quoted(path[start..].iter().rev().map(|joint| joint.name.as_str()));
+                    let joints = quoted(path[start..].iter().rev().map(|joint| joint.urdf.name.as_str()));
                     let message = format!("the joints {joints} form a cycle without a base link");
                     report.error(&joint.place, "cycle", message, "remove one of these joints or correct its parent");
                 }
-                reported.extend(path[start..].iter().map(|j| j.child.as_str()));
+                reported.extend(path[start..].iter().map(|j| j.urdf.child.link.as_str()));
                 break;
             }
             on_path.insert(at, path.len());
             path.push(joint);
-            at = &joint.parent;
+            at = &joint.urdf.parent.link;
         }
         settled.extend(on_path.into_keys());
     }
@@ -126,7 +128,9 @@ pub(crate) fn moving_bodies(robot: &RawRobot) -> Vec<Body> {
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); robot.links.len()];
     let mut has_parent = vec![false; robot.links.len()];
     for (j, joint) in robot.joints.iter().enumerate() {
-        if let (Some(&p), Some(&c)) = (index.get(joint.parent.as_str()), index.get(joint.child.as_str())) {
+        if let (Some(&p), Some(&c)) =
+            (index.get(joint.urdf.parent.link.as_str()), index.get(joint.urdf.child.link.as_str()))
+        {
             children[p].push(j);
             has_parent[c] = true;
         }
@@ -141,7 +145,7 @@ pub(crate) fn moving_bodies(robot: &RawRobot) -> Vec<Body> {
             let (link, X_RL) = members[at];
             for &j in &children[link] {
                 let joint = &robot.joints[j];
-                let child = index[joint.child.as_str()];
+                let child = index[joint.urdf.child.link.as_str()];
                 if joint.is_fixed() {
                     members.push((child, X_RL * joint.X_PJ));
                 } else {

@@ -13,7 +13,7 @@ use crate::place::TextPosition;
 
 /// Start offsets of all lines, to convert byte offsets to places without scanning the text each
 /// time.
-pub(crate) struct Lines<'t> {
+pub struct Lines<'t> {
     file: PathBuf,
     text: &'t str,
     starts: Vec<usize>,
@@ -23,7 +23,7 @@ pub(crate) struct Lines<'t> {
 
 impl<'t> Lines<'t> {
     /// Finds the lines of a text.
-    pub(crate) fn new(file: &Path, text: &'t str) -> Self {
+    pub fn new(file: &Path, text: &'t str) -> Self {
         let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
         Self { file: file.to_owned(), text, starts, origins: &[] }
     }

@@ -177,6 +177,29 @@ fn visuals_have_pose_shape_and_colour() {
     assert!(visuals.iter().all(|v| !v.geometry.triangles().unwrap().triangles.is_empty()));
 }
 
+/// Truth: values that `urdf_rs` reads from the file itself. The reader passes it a text generated
+/// from the file.
+#[test]
+fn the_numbers_are_those_that_urdf_rs_reads() {
+    let text = arm();
+    let (ours, theirs) = (read(&text).mechanism, urdf_rs::read_from_string(&text).unwrap());
+    for (a, b) in ours.links.iter().zip(&theirs.links) {
+        assert_eq!(a.name, b.name);
+        assert_eq!(a.inertia.map_or(0.0, |i| i.mass), b.inertial.mass.value);
+    }
+    for (a, b) in ours.joints.iter().zip(&theirs.joints) {
+        assert_eq!((&a.name, &a.parent, &a.child), (&b.name, &b.parent.link, &b.child.link));
+        assert_eq!(a.X_PJ.translation.vector, Vector3::from(*b.origin.xyz));
+        let (roll, pitch, yaw) = a.X_PJ.rotation.euler_angles();
+        assert_relative_eq!(vector![roll, pitch, yaw], Vector3::from(*b.origin.rpy), epsilon = 1e-15);
+        if let JointKind::Revolute(_) | JointKind::Prismatic(_) = a.kind {
+            assert_eq!((a.limits.lower, a.limits.upper), (b.limit.lower, b.limit.upper));
+        }
+        let mimic = a.mimic.as_ref().map(|m| (Some(m.ratio), Some(m.offset)));
+        assert_eq!(mimic, b.mimic.as_ref().map(|m| (m.multiplier, m.offset)));
+    }
+}
+
 #[test]
 fn slips_that_leave_a_robot_are_warned_of() {
     let text = robot(&[

@@ -1,90 +1,86 @@
-//! Single elements: their attributes, read and checked.
+//! Single elements: their attributes, checked and written to the plain text.
+
+use std::fmt::Write as _;
 
 use flexarm_settings::closest;
 use roxmltree::Node;
 
 use crate::lint::Lint;
-use crate::xml::named;
-
-/// An element, `None` if it is missing, and its name in messages.
-pub(super) struct Part<'n, 'i> {
-    pub(super) node: Option<Node<'n, 'i>>,
-    pub(super) owner: String,
-}
+use crate::lint::attribute::Attribute;
+use crate::lint::attribute::Kind::{self, Name};
+use crate::lint::attribute::Missing::{As, Fault, LeftOut};
+use crate::place::TextPosition;
+use crate::xml::{escaped, named};
 
 impl Lint<'_, '_> {
-    /// Returns the first child of this name.
-    pub(super) fn part<'n, 'i>(&self, node: Node<'n, 'i>, name: &str) -> Part<'n, 'i> {
-        Part { node: named(node, name), owner: format!("{}, <{name}>", self.owner) }
-    }
-
-    /// Returns the first child of this name; reports a fault if it is missing.
-    pub(super) fn needed<'n, 'i>(&mut self, node: Node<'n, 'i>, name: &str) -> Part<'n, 'i> {
-        let part = self.part(node, name);
-        if part.node.is_none() {
-            let message = format!("{} has no <{name}>", self.outer(node));
-            self.report.error(&self.lines.of(node), "missing-element", message, format!("add <{name} .../>"));
-        }
-        part
-    }
-
-    /// Returns the numbers of an attribute, which is required if it has no default. Those of a missing
-    /// element and those that cannot be read are the default, or else zeros.
-    pub(super) fn numbers<const N: usize>(
+    /// Writes the first child of this name and returns its place. A missing required child is
+    /// written with zeros.
+    pub(super) fn child(
         &mut self,
-        part: &Part<'_, '_>,
-        attribute: &str,
-        default: Option<[f64; N]>,
-    ) -> [f64; N] {
-        let found = match default {
-            Some(_) => part.node.and_then(|node| node.attribute(attribute)),
-            None => self.required(part, attribute),
-        };
-        let number = |word: &str| word.parse().ok().filter(|x: &f64| x.is_finite());
-        let read = |found: &str| found.split_whitespace().map(number).collect::<Option<Vec<_>>>()?.try_into().ok();
-        let expected = match N {
-            1 => "a finite number",
-            3 => "three finite numbers",
-            _ => "four finite numbers",
-        };
-        let numbers =
-            found.and_then(|found| read(found).or_else(|| self.not_a_number(part, attribute, found, expected)));
-        numbers.or(default).unwrap_or([0.0; N])
+        node: Node<'_, '_>,
+        name: &'static str,
+        must: bool,
+        attributes: &[Attribute],
+    ) -> Option<TextPosition> {
+        let found = if must { self.needed(node, name) } else { named(node, name) };
+        if let Some(child) = found {
+            self.element(child, &format!("{}, <{name}>", self.owner), attributes);
+        } else if must {
+            let zeros: Vec<_> = attributes.iter().map(|(name, kind, _)| (*name, kind.zero())).collect();
+            self.start(name, &zeros);
+            self.end(name);
+        }
+        found.map(|child| self.lines.of(child))
     }
 
-    /// Returns one number of an attribute; see [`Lint::numbers`].
-    pub(super) fn number(&mut self, part: &Part<'_, '_>, attribute: &str, default: Option<f64>) -> f64 {
-        self.numbers(part, attribute, default.map(|x| [x]))[0]
+    /// Writes an element with these attributes. Returns the numbers that could be read.
+    pub(super) fn element(&mut self, node: Node<'_, '_>, owner: &str, attributes: &[Attribute]) -> Vec<f64> {
+        let (mut all, mut written) = (Vec::new(), Vec::new());
+        for &(attribute, kind, missing) in attributes {
+            let found = match missing {
+                Fault => self.required(node, owner, attribute, kind),
+                LeftOut | As(_) => node.attribute(attribute),
+            };
+            let value = match (found, missing) {
+                (Some(found), _) => match kind.numbers(found) {
+                    Some(numbers) => {
+                        all.extend(numbers);
+                        found
+                    }
+                    None => {
+                        self.not_a_number(&self.lines.of(node), owner, attribute, found, kind.expected());
+                        kind.zero()
+                    }
+                },
+                (None, LeftOut) => continue,
+                (None, As(value)) => value,
+                (None, Fault) => kind.zero(),
+            };
+            written.push((attribute, value));
+        }
+        self.start(node.tag_name().name(), &written);
+        self.end(node.tag_name().name());
+        all
     }
 
-    /// Returns a number that may be infinite, if there is one.
-    pub(super) fn bound(&mut self, part: &Part<'_, '_>, attribute: &str) -> Option<f64> {
-        let found = part.node?.attribute(attribute)?;
-        let read = found.trim().parse().ok().filter(|x: &f64| !x.is_nan());
-        read.or_else(|| self.not_a_number(part, attribute, found, "a number"))
+    pub(super) fn start(&mut self, element: &str, attributes: &[(&str, &str)]) {
+        let _ = write!(self.text, "<{element}");
+        for (name, value) in attributes {
+            let _ = write!(self.text, " {name}=\"{}\"", escaped(value, true));
+        }
+        self.text.push('>');
     }
 
-    /// Reports an attribute that is not a number, or NaN or infinite.
-    fn not_a_number<T>(&mut self, part: &Part<'_, '_>, attribute: &str, found: &str, expected: &str) -> Option<T> {
-        let message = format!("{}: {attribute}={found:?}, expected {expected}", part.owner);
-        let help = "write plain decimal numbers such as 0.1 or -1.5e-3, separated by spaces";
-        self.report.error(&self.lines.of(part.node?), "not-a-number", message, help);
-        None
-    }
-
-    /// Returns a name in an attribute; reports a fault if it is missing or blank.
-    pub(super) fn name_in(&mut self, part: &Part<'_, '_>, attribute: &str) -> String {
-        let blank = part.node.and_then(|node| node.attribute(attribute)).is_some_and(|name| name.trim().is_empty());
-        let name = if blank { self.missing(part, attribute) } else { self.required(part, attribute) };
-        name.unwrap_or_default().to_owned()
+    pub(super) fn end(&mut self, element: &str) {
+        let _ = write!(self.text, "</{element}>");
     }
 
     /// Returns the name of a link or joint and sets it as the owner in later messages.
-    pub(super) fn name(&mut self, node: Node<'_, '_>) -> Option<String> {
+    pub(super) fn name<'n>(&mut self, node: Node<'n, '_>) -> Option<&'n str> {
         let tag = node.tag_name().name();
-        let name = self.name_in(&Part { node: Some(node), owner: format!("<{tag}>") }, "name");
+        let name = self.required(node, &format!("<{tag}>"), "name", Name)?;
         self.owner = format!("{tag} {name:?}");
-        Some(name).filter(|name| !name.is_empty())
+        Some(name)
     }
 
     /// Returns the name of an element for messages about its children.
@@ -95,28 +91,57 @@ impl Lint<'_, '_> {
         }
     }
 
-    /// Returns an attribute; reports a fault if the element is without it.
-    pub(super) fn required<'n>(&mut self, part: &Part<'n, '_>, attribute: &str) -> Option<&'n str> {
-        part.node?.attribute(attribute).or_else(|| self.missing(part, attribute))
+    /// Reports an attribute that is not a number, or NaN or infinite.
+    pub(super) fn not_a_number(
+        &mut self,
+        place: &TextPosition,
+        owner: &str,
+        attribute: &str,
+        found: &str,
+        expected: &str,
+    ) {
+        let message = format!("{owner}: {attribute}={found:?}, expected {expected}");
+        let help = "write plain decimal numbers such as 0.1 or -1.5e-3, separated by spaces";
+        self.report.error(place, "not-a-number", message, help);
     }
 
-    fn missing<T>(&mut self, part: &Part<'_, '_>, attribute: &str) -> Option<T> {
-        let message = format!("{} has no attribute {attribute:?}", part.owner);
-        let help = format!("add {attribute}=\"...\"");
-        self.report.error(&self.lines.of(part.node?), "missing-attribute", message, help);
-        None
+    /// Returns a child element; reports a fault if it is missing.
+    pub(super) fn needed<'n, 'i>(&mut self, node: Node<'n, 'i>, element: &'static str) -> Option<Node<'n, 'i>> {
+        let child = named(node, element);
+        if child.is_none() {
+            let owner = self.outer(node);
+            let message = format!("{owner} has no <{element}>");
+            self.report.error(&self.lines.of(node), "missing-element", message, format!("add <{element} .../>"));
+        }
+        child
+    }
+
+    /// Returns an attribute; reports a fault if it is missing.
+    pub(super) fn required<'n>(
+        &mut self,
+        node: Node<'n, '_>,
+        owner: &str,
+        attribute: &'static str,
+        kind: Kind,
+    ) -> Option<&'n str> {
+        let value = node.attribute(attribute).filter(|value| !matches!(kind, Name) || !value.trim().is_empty());
+        if value.is_none() {
+            let message = format!("{owner} has no attribute {attribute:?}");
+            self.report.error(&self.lines.of(node), "missing-attribute", message, format!("add {attribute}=\"...\""));
+        }
+        value
     }
 
     /// Warns about an element that is neither URDF nor a known extension, and thus probably
     /// misspelt.
-    pub(super) fn known_element(&mut self, node: Node<'_, '_>, known: &str) {
+    pub(super) fn known_element(&mut self, node: Node<'_, '_>, known: &[&'static str]) {
         let name = node.tag_name().name();
-        if node.tag_name().namespace().is_some() || known.split(' ').any(|word| word == name) {
+        if node.tag_name().namespace().is_some() || known.contains(&name) {
             return;
         }
-        let help = match closest(name, known.split(' ')) {
+        let help = match closest(name, known.iter().copied()) {
             Some(meant) => format!("did you mean <{meant}>?"),
-            None => format!("remove it, or use one of {}", known.replace(' ', ", ")),
+            None => format!("remove it, or use one of {}", known.join(", ")),
         };
         let message = format!("{}: the element <{name}> is not URDF and is ignored", self.owner);
         self.report.warning(&self.lines.of(node), "unknown-element", message, help);
