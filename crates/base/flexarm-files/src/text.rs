@@ -66,6 +66,11 @@ impl Source {
         Self { path: path.to_owned(), text: text.to_owned(), page }
     }
 
+    /// Text of the file.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Creates an error at a byte range of the text.
     pub fn error(&self, span: std::ops::Range<usize>, message: impl Into<String>) -> TextFileError {
         let before = self.text.get(..span.start).unwrap_or(&self.text);

@@ -23,7 +23,7 @@ use zip::write::SimpleFileOptions;
 
 use crate::description::{About, Fmi, MODEL_IDENTIFIER, description, page};
 use crate::error::FmuError;
-use crate::model::{FmuModel, FmuSettings};
+use crate::model::{FmuModel, FmuSettings, first_pose};
 use crate::variables::Causality;
 
 /// File with the settings of the plant in the resources.
@@ -295,11 +295,6 @@ fn same_arm(files: &NamedFiles, arm: &Arc<Arm>, settings: &FmuSettings) -> Resul
     })();
     let _ = fs::remove_dir_all(&folder);
     checked
-}
-
-/// Returns the joint positions at the start (rad or m), as [`FmuModel::new`] takes them.
-fn first_pose(arm: &Arm, settings: &FmuSettings) -> Vec<f64> {
-    settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.joints().count()])
 }
 
 fn filed(model: &FmuModel, settings: &FmuSettings, token: &str, step_s: f64) -> Filed {

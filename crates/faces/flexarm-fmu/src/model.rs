@@ -101,9 +101,10 @@ impl FmuModel {
         let robot = filed.robot();
         let arm = robot.model(&settings.modelling)?;
         let options = options(settings, None);
-        let live = arm.live(settings.pose.as_deref(), options.step_s, &options)?;
+        let pose = first_pose(&arm, settings);
+        let live = arm.live(Some(&pose), options.step_s, &options)?;
         let has_acceleration = !settings.stepper.entry().maximal;
-        let equations = arm.equations(settings.pose.as_deref(), &LiveOptions::default()).ok();
+        let equations = arm.equations(Some(&pose), &LiveOptions::default()).ok();
         let equations = equations.filter(|own| has_acceleration && !own.coordinates().is_empty());
         let elastic = equations.map(|own| own.elastic());
         let starts = Starts {
@@ -468,6 +469,11 @@ impl FmuModel {
 }
 
 /// Returns w, x, y, z of the orientation, w not negative.
+/// Joint positions at the start (rad or m).
+pub(crate) fn first_pose(arm: &Arm, settings: &PlantSettings) -> Vec<f64> {
+    settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.joints().count()])
+}
+
 fn quaternion(pose: &Pose) -> [f64; 4] {
     let q = UnitQuaternion::from_rotation_matrix(&pose.rotation);
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };

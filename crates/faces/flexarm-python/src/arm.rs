@@ -475,7 +475,7 @@ impl PyArm {
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m). Default: zero.
+    ///     Joints (rad or m). Default: :attr:`Robot.start_pose`.
     /// period : float, default 1e-3
     ///     Control period (s), a whole number of steps.
     /// step : float, optional

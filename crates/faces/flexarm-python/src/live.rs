@@ -116,7 +116,7 @@ impl PyLive {
     /// Parameters
     /// ----------
     /// q : array_like, shape (n,), optional
-    ///     Joints (rad or m). Default: zero.
+    ///     Joints (rad or m). Default: :attr:`Robot.start_pose`.
     #[pyo3(signature = (q=None))]
     fn reset(&self, q: Option<&Bound<'_, PyAny>>) -> PyResult<()> {
         let q = q.map(|q| numbers("q", q, &[(self.n, "joints")], false)).transpose()?;

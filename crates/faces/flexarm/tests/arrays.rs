@@ -153,7 +153,7 @@ fn a_live_arm_refuses_what_makes_no_sense_and_starts_again() {
     let options = RunOptions::default();
     assert!(matches!(arm.live(None, 1.5e-3, &options), Err(Error::Value(_))));
     assert!(matches!(arm.live(Some(&[0.0; 3]), 1e-3, &options), Err(Error::Pose(_))));
-    let mut live = arm.live(None, 2e-3, &options).unwrap();
+    let mut live = arm.live(Some(&[0.0; 6]), 2e-3, &options).unwrap();
     assert!(matches!(live.step(&Command { q: &[f64::NAN; 6], ..Command::default() }), Err(Error::Pose(_))));
     let begin = live.tcp_pose();
     for k in 1..=50 {
@@ -161,8 +161,26 @@ fn a_live_arm_refuses_what_makes_no_sense_and_starts_again() {
     }
     assert!((live.time_s() - 0.1).abs() < 1e-12);
     assert!(live.position()[0] > 0.0 && live.position()[0] < 0.05, "servos lag: {}", live.position()[0]);
-    live.reset(None).unwrap();
+    live.reset(Some(&[0.0; 6])).unwrap();
     assert_eq!((live.time_s(), live.tcp_pose()), (0.0, begin));
+}
+
+/// Statics, live arms and their reset stand at the start of the robot's motion unless told otherwise.
+#[test]
+fn a_live_arm_begins_where_statics_stand() {
+    let arm = robot("kr210").model(&Modelling::default()).unwrap();
+    let stands = arm.statics(None, [0.0; 6]).unwrap();
+    let mut live = arm.live(None, 1e-3, &RunOptions::default()).unwrap();
+    assert_eq!(live.position(), stands.at);
+    let tcp = live.tcp_pose().translation.vector;
+    let place: Vec<f64> = (0..3).map(|k| stands.tcp_position_m[k] + stands.tcp_displacement_m[k]).collect();
+    // measured 0.0
+    let apart = tcp.iter().zip(&place).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+    println!("{apart:e} m apart");
+    assert!(apart < 1e-12 || (0..3).all(|k| (tcp[k] - stands.tcp_position_m[k]).abs() < 1e-12), "{tcp} {place:?}");
+    live.step(&Command { q: &POSE, ..Command::default() }).unwrap();
+    live.reset(None).unwrap();
+    assert_eq!(live.position(), stands.at);
 }
 
 /// Follows a circle of two joints for `steps` periods of 1 ms; returns the TCP positions.

@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use flexarm::robots::check_with_loads;
 use flexarm::{LoadOptions, Modelling, Motion, Robot, RunOptions, Scenario, check};
 
 /// A folder that is removed at the end.
@@ -125,4 +126,118 @@ fn an_expression_that_the_steps_do_not_resolve_is_told() {
     assert_eq!(told("sin(125.66370614359172*t)"), [""; 0]);
     let found = told("0.1*sin(18849.55592153876*t)");
     assert!(found.len() == 1 && found[0].contains("3000.0 Hz has 0.3 steps per period"), "{found:?}");
+}
+
+/// The drives of kr210 with entries that need no robot to compare with, and entries of all kinds.
+fn drives_with_entries() -> String {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap();
+    let text = std::fs::read_to_string(project.join("robots/kr210/drives.toml")).unwrap();
+    let kept = text.lines().filter(|line| !line.starts_with("default_trajectory"));
+    let text: String = kept.map(|line| format!("{line}\n")).collect();
+    let servo = "kind = \"torque\"\nratio = 200.0\nmotor_inertia = 0.01\ntorque_limit = 3000.0\n\
+                 servo = { position_gain = 20.0, velocity_gain = 40000.0 }\n\
+                 friction = { coulomb = 60.0, stribeck = 20.0, stribeck_velocity = 0.05, regularisation = 0.01 }\n";
+    let urdf = project.join("robots/kr210/kr210.urdf");
+    let text = text.replace("\"kr210.urdf\"", &format!("{urdf:?}"));
+    let text = text.replacen("kind = \"gearbox\"\n", servo, 1);
+    let text = text.replace(
+        "{ stiffness = 2775692.4, damping = 1232.3 }",
+        "{ stiffness = [2e7, 2e7, 2775692.4], damping = [5000.0, 5000.0, 1232.3] }",
+    );
+    text + "[mounting]\nstiffness = [1e9, 1e9, 1e9, 1e8, 1e8, 1e8]\nxyz = [0.0, 0.0, -0.3]\nrpy = [0.0, 0.0, 0.785]\n\
+            backlash = [1e-5, 1e-5, 1e-5, 0.0, 0.0, 0.0]\nmass = 400.0\ncom = [0.0, 0.0, -0.2]\n\
+            inertia = [20.0, 20.0, 20.0, 0.0, 0.0, 0.0]\n\
+            [[balancer]]\njoint = \"joint_2\"\nsine = { torque = 300.0, zero = 1.57 }\n\
+            [[balancer]]\nfrom = { link = \"link_1\", xyz = [0.0, 0.3, 0.1] }\n\
+            to = { link = \"link_2\", xyz = [0.7, 0.0, 0.3] }\n\
+            gas_spring = { force = 900.0, length = 2.0, stroke = 1.5, progression = 1.4 }\n\
+            [[balancer]]\njoint = \"joint_3\"\ncurve = [[-2.4, 50.0], [0.0, 0.0], [2.6, -50.0]]\n\
+            [[controller_axis]]\njoint = \"joint_2\"\nzero = 1.5708\n\
+            [[controller_axis]]\njoint = \"joint_3\"\nzero_deg = -90.0\n"
+}
+
+#[test]
+fn slips_in_mountings_balancers_axes_and_drives_are_told() {
+    let folder = Folder::new("usual");
+    folder.tries(
+        &drives_with_entries(),
+        &[
+            ("xyz = [0.0, 0.0, -0.3]", "xyz = [0.0, 0.0, -300]", "unusual", "mounting.xyz is 300 m"),
+            ("rpy = [0.0, 0.0, 0.785]", "rpy = [0.0, 0.0, 45]", "angle", "degrees?"),
+            ("backlash = [1e-5, ", "backlash = [0.1, ", "unusual", "mounting.backlash is 0.1 m or rad"),
+            ("com = [0.0, 0.0, -0.2]", "com = [0.0, 0.0, -200]", "unusual", "mounting.com"),
+            ("inertia = [20.0, 20.0, 20.0", "inertia = [2e7, 2e7, 2e7", "unusual", "radius of gyration of mounting"),
+            ("zero = 1.57 }", "zero = 90.0 }", "angle", "degrees?"),
+            ("length = 2.0, stroke = 1.5", "length = 2000, stroke = 1500", "unusual", "balancer.gas_spring.stroke"),
+            ("force = 900.0", "force = 0.9", "balancer-weak", "kN"),
+            ("[[-2.4, 50.0], [0.0, 0.0], [2.6,", "[[-138.0, 50.0], [0.0, 0.0], [149.0,", "angle", "degrees?"),
+            ("zero = 1.5708", "zero = 90.0", "angle", "controller_axis.zero"),
+            ("zero_deg = -90.0", "zero_deg = -1.5708", "unusual", "radians?"),
+            ("position_gain = 20.0", "position_gain = 0.02", "position-gain", "0.02 1/s"),
+            ("velocity_gain = 40000.0", "velocity_gain = 40.0", "velocity-gain", "kN m s/rad?"),
+            ("torque_limit = 3000.0", "torque_limit = 3e6", "unusual", "torque_limit of joint \"joint_1\""),
+            ("regularisation = 0.01", "regularisation = 1e-9", "unusual", "drive.friction.regularisation"),
+            ("stribeck_velocity = 0.05", "stribeck_velocity = 57.0", "friction-smoothing", "degrees?"),
+            ("damping = [5000.0, ", "damping = [0.005, ", "gear-damping", "joint \"joint_3\""),
+        ],
+    );
+}
+
+#[test]
+fn slips_in_a_given_section_and_its_split_are_told() {
+    let folder = Folder::new("given");
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap();
+    let text = std::fs::read_to_string(project.join("robots/kr210/beams.toml")).unwrap();
+    let given = "beam = { section = \"given\", EA = 6.7e8, EI_y = 5.5e6, EI_z = 7.4e6, GJ = 4.9e6, \
+                 mass_per_length = 26.0, rotary_y = 0.21, rotary_z = 0.29, kGA_y = 1e8, kGA_z = 1e8 }";
+    let change = |line: &str| match line {
+        line if line.starts_with("default_trajectory") => String::new(),
+        line if line.contains("width = 0.24, height = 0.24") => given.to_owned(),
+        line => line.replace("\"kr210.urdf\"", &format!("{:?}", project.join("robots/kr210/kr210.urdf"))),
+    };
+    let sound: String = text.lines().map(|line| change(line) + "\n").collect();
+    folder.tries(
+        &sound,
+        &[
+            ("kGA_z = 1e8", "kGA_z = 1e5", "unusual", "kGA over EA of link \"link_3\""),
+            ("kGA_y = 1e8, kGA_z = 1e8", "kGA_y = 1e11, kGA_z = 1e11", "unusual", "EA in kN?"),
+            ("split = 0.5", "split = 0.999", "unusual", "flexible_link.beam.split"),
+        ],
+    );
+}
+
+#[test]
+fn slips_in_loads_and_paths_are_told() {
+    let folder = Folder::new("use");
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap();
+    let robot = project.join("robots/kr210/robot.toml");
+    let told = |motion: Option<&Path>, loads: Option<&Path>| -> Vec<String> {
+        let found = check_with_loads(&robot, motion, loads, &LoadOptions::default()).into_iter();
+        found.filter(|f| f.severity != "note" && f.code != "missing-mesh").map(|f| f.message).collect()
+    };
+    let impulse = "format = 1\n[[load]]\nkind = \"impulse\"\nstart = 1.0\nduration = 0.002\nforce = [0.0, 5.0, 0.0]\n";
+    let milling = "format = 1\n[[load]]\nkind = \"milling\"\nteeth = 4\nspindle_rpm = 600.0\nforce = [9.0, 9.0, 0.0]\n";
+    let path = std::fs::read_to_string(project.join("trajectories/milling_square.toml")).unwrap();
+    let (loads, motion) = (folder.0.join("loads.toml"), folder.0.join("path.toml"));
+    for (sound, from, to, part) in [
+        (impulse, "0.002", "2.0", "the duration of an impulse is 2 s"),
+        (milling, "600.0", "6.0", "the spindle speed of a load is 6 1/min"),
+        (&*path, "speed = 250.0\nacc", "speed = 15000.0\nacc", "mm/min for mm/s?"),
+        (&*path, "acceleration = 2000.0", "acceleration = 2.0", "mm/s2 for m/s2?"),
+        (&*path, "jerk = 40000.0", "jerk = 40.0", "mm/s3 for m/s3?"),
+        (&*path, "joint_speed = 0.3", "joint_speed = 30.0", "per cent?"),
+        (&*path, "blend = 8.0", "blend = 0.008", "its blend is"),
+    ] {
+        assert!(sound.contains(from), "{from}");
+        let is_path = sound.contains("[path]");
+        let tell = |text: &str| {
+            std::fs::write(if is_path { &motion } else { &loads }, text).unwrap();
+            if is_path { told(Some(&motion), None) } else { told(None, Some(&loads)) }
+        };
+        let before = tell(sound);
+        let after = tell(&sound.replacen(from, to, 1));
+        println!("{to}: {after:?}");
+        assert!(!before.iter().any(|message| message.contains(part)), "{before:?}");
+        assert!(after.iter().any(|message| message.contains(part)), "{to}: {after:?}");
+    }
 }

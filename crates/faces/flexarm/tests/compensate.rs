@@ -502,7 +502,7 @@ fn an_iteration_that_enlarges_the_error_of_an_undamped_arm_is_discarded_and_the_
         eprintln!("{}: {}", caveat.code, caveat.message);
     }
     let discarded = found.caveats.iter().find(|caveat| caveat.code == "discarded").unwrap();
-    assert!(discarded.message.contains("iteration 3 (up to 200.0 Hz) multiplied it by 19"), "{}", discarded.message);
+    assert!(discarded.message.contains("iteration 3 (up to 200.0 Hz) multiplied it by 21"), "{}", discarded.message);
     assert!(found.iterations < 6 && found.cutoff_hz.unwrap() < 150.0);
     // Discarded iterations are in no list: one peak before, and a smaller one per iteration kept.
     assert_eq!(found.model_peaks_m.len(), 1 + found.iterations, "{:?}", found.model_peaks_m);

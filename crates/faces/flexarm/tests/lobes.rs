@@ -289,7 +289,15 @@ fn what_no_tool_has_is_refused_and_what_few_have_is_told_with_its_slip() {
         ("stiffness = 1.5e7", "stiffness = 15.0", "tool-stiffness", "N/um"),
         ("frequency = 1200.0", "frequency = 1.2", "tool-frequency", "kHz"),
         ("diameter = 20.0", "diameter = 600.0", "tool-diameter", ""),
+        ("frequency = 1200.0", "frequency = 7540.0", "tool-mass", "rad/s"),
+        ("helix = 30.0", "helix = 0.5236", "unusual", "radians"),
+        ("helix = 30.0", "helix = 30.0\nlead = 1.5708", "unusual", "radians"),
+        ("radial = 250.0", "radial = -250.0", "unusual", ""),
+        ("radial = 250.0", "radial = 8000.0", "unusual", ""),
+        ("[tool]", "[tool]\ntip = [0.0, 0.0, 300000.0]", "unusual", "millimetres"),
+        ("deepest = 20.0", "deepest = 0.02", "tool-deepest", "millimetres"),
     ] {
+        assert!(good.contains(old), "{old}");
         let tool = folder.tool(&good.replace(old, new)).unwrap().at_speeds(vec![6000.0]);
         let found = at(&kr210(), &tool, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
         let caveat = found.caveats.iter().find(|caveat| caveat.code == code).unwrap();
@@ -298,7 +306,35 @@ fn what_no_tool_has_is_refused_and_what_few_have_is_told_with_its_slip() {
     }
     let usual =
         at(&kr210(), &folder.tool(&good).unwrap().at_speeds(vec![6000.0]), &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
-    assert!(!usual.caveats.iter().any(|caveat| caveat.code.starts_with("tool-")), "{:?}", usual.caveats);
+    let doubts = |code: &str| code.starts_with("tool-") || code == "unusual";
+    assert!(!usual.caveats.iter().any(|caveat| doubts(&caveat.code)), "{:?}", usual.caveats);
+    // Small cutters have light modes.
+    let small = good.replace("diameter = 20.0", "diameter = 1.0").replace("ae = 5.0", "ae = 0.3");
+    let small = small.replace("1200.0", "6000.0").replace("1.5e7", "1e6").replace("deepest = 20.0", "deepest = 2.0");
+    let small = folder.tool(&small).unwrap().at_speeds(vec![40000.0]);
+    let usual = at(&kr210(), &small, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
+    assert!(!usual.caveats.iter().any(|caveat| doubts(&caveat.code)), "{:?}", usual.caveats);
+}
+
+/// A path in mm/min where mm/s are expected moves the tool by millimetres from tooth to tooth.
+#[test]
+fn a_feed_per_tooth_that_no_cutter_takes_is_told_along_a_motion() {
+    let folder = Folder::new("feed");
+    let good = std::fs::read_to_string(root().join("robots/tools/endmill_20mm.toml")).unwrap();
+    let motion = Motion::load(root().join("trajectories/milling_square.toml"), &kr210()).unwrap();
+    let told = |rpm: f64| {
+        let tool = folder.tool(&good).unwrap().at_speeds(vec![rpm]);
+        let request = LobesRequest { modelling: rigid(), ..LobesRequest::default() };
+        let place = CuttingPlace::Along(&motion, 4);
+        let found = lobes(&kr210(), &tool, &place, &request, &|_, _| true).unwrap();
+        let named = found.caveats.iter().find(|caveat| caveat.message.contains("feed per tooth"));
+        named.map(|caveat| (caveat.value.unwrap(), caveat.likely.clone()))
+    };
+    // 250 mm/s at 8000/min with three teeth: 0.63 mm; at 400/min 12.5 mm.
+    assert_eq!(told(8000.0), None);
+    let (feed, likely) = told(400.0).unwrap();
+    println!("{feed} m a tooth, {likely}");
+    assert!((feed / 12.5e-3 - 1.0).abs() < 0.01 && likely.contains("mm/min"), "{feed} {likely}");
 }
 
 #[test]

@@ -405,6 +405,21 @@ fn fingers_are_held_and_of_two_arms_one_moves() {
     assert!((two.moving_mass_kg / (36.0 + upper_mass()) - 1.0).abs() < 1e-9);
 }
 
+/// Limits of acceleration and jerk of a URDF 1.2, as of the UR5e of `airo-models`.
+#[test]
+fn the_sample_motion_keeps_limits_of_acceleration_and_jerk() {
+    for more in ["", r#" acceleration="2.5""#, r#" acceleration="2.5" jerk="8""#, r#" acceleration="0.3" jerk="0.5""#] {
+        let folder = Folder::new(&format!("acceleration-{}", more.len()));
+        let limit = format!(r#"lower="-3" upper="3" effort="1500" velocity="3"{more}"#);
+        let urdf = Arm { limit: Some("LIMIT"), ..ARM }.urdf("").replace("LIMIT", &limit);
+        let urdf = urdf.replace(r#"<robot name="arm""#, r#"<robot name="arm" version="1.2""#);
+        let made = made(&folder, &urdf, &NewOptions::default());
+        // `codes` finds violations of the motion.
+        let found = codes(&made);
+        assert!(!found.iter().any(|code| code == "trajectory" || code == "joint-limit"), "{more}: {found:?}");
+    }
+}
+
 #[test]
 fn missing_and_senseless_limits_are_told_and_the_motion_keeps_what_it_can() {
     let limits: [(&str, Option<&'static str>, &str); 6] = [

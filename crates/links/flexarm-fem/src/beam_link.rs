@@ -47,6 +47,9 @@ pub struct BeamLink {
     pub mass: Option<f64>,
 }
 
+/// Minimum part of a section's y axis across the beam, 6 degrees off the beam.
+const ACROSS: f64 = 0.1;
+
 impl BeamLink {
     /// Beam along link x from A at the link origin to B, cut in the middle, Timoshenko's theory.
     pub fn new(name: impl Into<String>, section: Section, material: Material, length: f64) -> Self {
@@ -75,16 +78,17 @@ impl BeamLink {
     /// * `offset`: from the joint line to the beam, link axes, m.
     ///
     /// # Errors
-    /// [`FemError::OutOfRange`] if `axis` is zero or `y` is parallel to it.
+    /// [`FemError::OutOfRange`] if `axis` is zero or `y` is within 6 degrees of it.
     pub fn along(self, axis: Vector3<f64>, y: Vector3<f64>, roll: f64, offset: Vector3<f64>) -> Result<Self, FemError> {
-        let direction = |what: &str, v: Vector3<f64>| {
-            v.try_normalize(1e-9).filter(|v| v.amax().is_finite()).ok_or_else(|| {
+        let direction = |what: &str, v: Vector3<f64>, least: f64| {
+            v.try_normalize(least).filter(|v| v.amax().is_finite()).ok_or_else(|| {
                 let (what, found) = (what.to_owned(), v.norm());
-                FemError::OutOfRange { what, found, allowed: "above 1e-9 in length".into() }
+                FemError::OutOfRange { what, found, allowed: format!("above {least} in length") }
             })
         };
-        let x = direction("beam axis", axis)?;
-        let y = direction("part of the section axis y across the beam", y - x * x.dot(&y))?;
+        let x = direction("beam axis", axis, 1e-9)?;
+        let y = direction("section axis y", y, 1e-9)?;
+        let y = direction("part of the section axis y across the beam", y - x * x.dot(&y), ACROSS)?;
         let turned = y * roll.cos() + x.cross(&y) * roll.sin();
         let R_LE = Matrix3::from_columns(&[x, turned, x.cross(&turned)]);
         Ok(Self {

@@ -1,10 +1,16 @@
-//! Ranges of the numbers in flexarm's TOML files, by key.
+//! Ranges of the numbers in flexarm's TOML files, by key: possible ones, and usual ones.
 
-use std::ops::Range;
+use std::cell::RefCell;
+use std::f64::consts::TAU;
+use std::ops::{Range, RangeInclusive};
 
+use flexarm_settings::finding::FindingKind;
 use flexarm_settings::{OutOfRange, Quantity};
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+use crate::caveat::slip::{self, Factor};
+use crate::caveat::{Finding, kinds};
 
 /// Quantity of each key; a prefix restricts it to one table, as in `payload.mass`.
 pub(crate) type Ranges = &'static [(&'static str, Quantity)];
@@ -89,6 +95,82 @@ pub(crate) const OF_LOADS: Ranges = &[
     ("spindle_rpm", Quantity::SPEED),
 ];
 
+/// Usual magnitudes of nonzero numbers that need no robot to compare with, the caveat of others, and
+/// the mistakes that explain them.
+struct Usual {
+    keys: &'static [&'static str],
+    kind: FindingKind,
+    range: RangeInclusive<f64>,
+    factors: &'static [Factor],
+}
+
+/// Usual numbers of a robot file.
+const USUAL: [Usual; 6] = [
+    // One turn: larger angles are in degrees.
+    Usual {
+        keys: &["rpy", "roll", "free_angle", "sine.zero", "controller_axis.zero"],
+        kind: kinds::ANGLE,
+        range: 0.0..=TAU + 1e-9,
+        factors: slip::ANGLE,
+    },
+    // Smaller corrections are calibrations; a right angle in rad is 1.57.
+    Usual {
+        keys: &["zero_deg"],
+        kind: kinds::UNUSUAL.with_unit("degrees"),
+        range: 2.0..=f64::INFINITY,
+        factors: &[(1.0 / slip::DEGREES, "radians")],
+    },
+    // Parts of arms, the longest of which reach 70 m.
+    Usual {
+        keys: &[
+            "free_length",
+            "gas_spring.length",
+            "stroke",
+            "from.xyz",
+            "to.xyz",
+            "offset",
+            "ends",
+            "mounting.xyz",
+            "mounting.com",
+        ],
+        kind: kinds::UNUSUAL.with_unit("m"),
+        range: 0.0..=20.0,
+        factors: slip::LENGTH,
+    },
+    Usual { keys: &["split"], kind: kinds::UNUSUAL, range: 0.05..=0.95, factors: &[] },
+    // Anchored feet have hundredths of a millimetre.
+    Usual {
+        keys: &["mounting.backlash"],
+        kind: kinds::UNUSUAL.with_unit("m or rad"),
+        range: 0.0..=0.01,
+        factors: &[(1e3, "millimetres or mrad"), (slip::DEGREES, "degrees")],
+    },
+    // Friction that acts below the resolution of a speed.
+    Usual {
+        keys: &["regularisation"],
+        kind: kinds::UNUSUAL.with_unit("rad/s"),
+        range: 1e-6..=f64::INFINITY,
+        factors: &[],
+    },
+];
+
+/// Returns the caveats about numbers of a robot file that are possible but not usual.
+///
+/// * `text`: of a file that has been read as TOML.
+pub(crate) fn unusual(text: &str) -> Vec<Finding> {
+    let found = RefCell::new(Vec::new());
+    let judge = |name: &str, number: f64| {
+        for Usual { kind, range, factors, .. } in
+            USUAL.iter().filter(|usual| number != 0.0 && usual.keys.iter().any(|key| belongs(name, key)))
+        {
+            found.borrow_mut().extend(slip::outside(kind, name, number.abs(), range, factors, 1.0));
+        }
+        Ok(number)
+    };
+    first(text, &judge);
+    found.into_inner()
+}
+
 /// Returns the first finite number outside its range, with its location and a message. Numbers of
 /// other keys only have an upper bound on their magnitude.
 ///
@@ -132,11 +214,14 @@ fn in_value(value: &Spanned<DeValue<'_>>, name: &str, check: Check<'_>) -> Optio
 }
 
 fn check(name: &str, number: f64, ranges: Ranges) -> Result<f64, OutOfRange> {
-    // A table whose keys are joint names has one quantity.
-    let own = |key: &str| {
-        let within = name.strip_suffix(key).is_some_and(|rest| rest.is_empty() || rest.ends_with('.'));
-        within || name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.') && !rest[1..].contains('.'))
-    };
-    let quantity = ranges.iter().find(|(key, _)| own(key)).map_or(Quantity::NUMBER, |(_, quantity)| *quantity);
+    let quantity =
+        ranges.iter().find(|(key, _)| belongs(name, key)).map_or(Quantity::NUMBER, |(_, quantity)| *quantity);
     quantity.check(name, number)
+}
+
+/// Whether a path of keys ends with a key, or is in a table of it: a table whose keys are joint
+/// names has one quantity.
+fn belongs(name: &str, key: &str) -> bool {
+    let within = name.strip_suffix(key).is_some_and(|rest| rest.is_empty() || rest.ends_with('.'));
+    within || name.strip_prefix(key).is_some_and(|rest| rest.starts_with('.') && !rest[1..].contains('.'))
 }

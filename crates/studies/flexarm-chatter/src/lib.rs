@@ -39,7 +39,7 @@ use flexarm_run::caveat::of_use;
 use flexarm_run::{Error, Finding, Modelling, Motion, Robot, caveat};
 
 pub use crate::milling::ChatterError;
-pub use caveats::tool_caveats;
+pub use caveats::{feed_caveat, tool_caveats};
 pub use files::rounded_down;
 pub use tool_file::CuttingTool;
 
@@ -261,10 +261,11 @@ pub fn lobes(
     answer.left_out = left_out;
     if let CuttingPlace::Along(motion, _) = place {
         answer.caveats = of_use::of_motion(motion, &*robot.rigid_model()?);
+        answer.caveats.extend(feed_caveat(robot, tool, motion)?);
     }
     answer.caveats.extend(places.iter().flat_map(CutPose::caveats));
     answer.caveats = caveat::once_each(std::mem::take(&mut answer.caveats));
-    answer.caveats.extend(caveats::tool_caveats(tool));
+    answer.caveats.extend(tool_caveats(tool, deepest_m));
     answer.warnings = caveat::warnings(&answer.caveats);
     if let Some(paths) = paths {
         files::save(&mut answer, tool, paths)?;

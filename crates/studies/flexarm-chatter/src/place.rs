@@ -16,13 +16,54 @@ use flexarm_run::{Error, Finding, Modelling, Motion, Robot, TCP_FRAME};
 /// Minimum number of poses along a motion.
 const MIN_PLACES: usize = 2;
 /// Speed below which the tool counts as at rest (m/s).
-const STANDS: f64 = 1e-5;
+pub(super) const STANDS: f64 = 1e-5;
 /// Sine of the angle to the tool's axis below which a feed counts as parallel to it.
 const ALONG_AXIS: f64 = 0.05;
 /// Time difference for the direction of the feed (s).
 const INSTANT: f64 = 1e-4;
 /// Maximum number of reported natural frequencies.
 const MAX_FREQUENCIES: usize = 6;
+
+/// Tip of a tool at an instant of a motion.
+pub(super) struct TipMotion {
+    t: f64,
+    q: Vec<f64>,
+    /// Velocity (m/s) and direction from the spindle to the tip, world axes.
+    pub(super) velocity: Vector3<f64>,
+    axis: Vector3<f64>,
+}
+
+/// Returns the tip of a tool on the rigid robot at the middles of `n` equal parts of a motion.
+pub(super) fn tip_motion(
+    robot: &Robot,
+    tool: &CuttingTool,
+    motion: &Motion,
+    n: usize,
+) -> Result<Vec<TipMotion>, Error> {
+    let model = robot.rigid_model()?;
+    let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
+    let trajectory = motion.trajectory.with_joint_order(&names)?;
+    let frame = model.frame(TCP_FRAME).expect("the TCP of the model").clone();
+    let mut data = Data::new(&model);
+    let sample = |t: f64| {
+        let mut q = vec![0.0; names.len()];
+        let (mut qdot, mut qddot) = (q.clone(), q.clone());
+        trajectory.sample(t, &mut q, &mut qdot, &mut qddot);
+        q
+    };
+    let mut tip = |t: f64| {
+        forward_kinematics(&model, &mut data, &DVector::from_vec(sample(t)));
+        let X_WT = data.X_WF(&frame);
+        (X_WT.transform_point(&tool.tip.into()).coords, tool.axis.in_world(&X_WT.rotation))
+    };
+    let part = trajectory.duration() / n as f64;
+    let instant = |k: usize| {
+        let t = part * (k as f64 + 0.5);
+        let ((before, _), (after, axis)) = (tip(t - INSTANT), tip(t + INSTANT));
+        TipMotion { t, q: sample(t), velocity: (after - before) / (2.0 * INSTANT), axis }
+    };
+    Ok((0..n).map(instant).collect())
+}
 
 /// One pose with the axes of the cut: x along the feed, z from the tip to the spindle.
 pub(super) struct CutPose {
@@ -60,34 +101,15 @@ impl CutPose {
         if n < MIN_PLACES {
             return Err(LobesError::Places { found: n, least: MIN_PLACES }.into());
         }
-        let model = robot.rigid_model()?;
-        let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
-        let trajectory = motion.trajectory.with_joint_order(&names)?;
-        let frame = model.frame(TCP_FRAME).expect("the TCP of the model").clone();
-        let mut data = Data::new(&model);
-        let sample = |t: f64| {
-            let mut q = vec![0.0; names.len()];
-            let (mut qdot, mut qddot) = (q.clone(), q.clone());
-            trajectory.sample(t, &mut q, &mut qdot, &mut qddot);
-            q
-        };
-        let mut tip = |t: f64| {
-            forward_kinematics(&model, &mut data, &DVector::from_vec(sample(t)));
-            let X_WT = data.X_WF(&frame);
-            (X_WT.transform_point(&tool.tip.into()).coords, tool.axis.in_world(&X_WT.rotation))
-        };
         let arm = robot.model(modelling)?;
         let (mut places, mut left_out) = (Vec::new(), 0);
-        for k in 0..n {
-            let t = trajectory.duration() * (k as f64 + 0.5) / n as f64;
-            let ((before, _), (after, axis)) = (tip(t - INSTANT), tip(t + INSTANT));
-            let velocity = (after - before) / (2.0 * INSTANT);
+        for TipMotion { t, q, velocity, axis } in tip_motion(robot, tool, motion, n)? {
             let across = velocity.cross(&axis).norm();
             if velocity.norm() < STANDS || across < ALONG_AXIS * velocity.norm() {
                 left_out += 1;
                 continue;
             }
-            let posed = Posed::new(arm.clone(), sample(t))?;
+            let posed = Posed::new(arm.clone(), q)?;
             places.push(Self::new(posed, tool, Some(t), Some(velocity / velocity.norm()))?);
         }
         if places.is_empty() { Err(LobesError::NoFeed.into()) } else { Ok((places, left_out)) }

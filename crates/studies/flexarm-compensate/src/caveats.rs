@@ -61,8 +61,10 @@ fn discarded_caveat(answer: &Compensation, discarded: &[Discarded]) -> Option<Fi
         (kept, Some(hz)) => format!("{kept} kept, corrected up to {hz:.1} Hz"),
     };
     (!named.is_empty()).then(|| {
-        let text =
-            format!("iterations that increase the RMS error on the model are discarded: {}; {kept}", named.join(", "));
+        let text = format!(
+            "iterations that increase the RMS or largest error on the model are discarded: {}; {kept}",
+            named.join(", ")
+        );
         let caveat = Finding::warning(
             "discarded",
             "compensation",

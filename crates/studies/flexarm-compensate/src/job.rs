@@ -31,6 +31,11 @@ const REST: f64 = 1e-6;
 /// Fraction of the initial error below which the iteration stops.
 const ENOUGH: f64 = 1e-5;
 
+/// Lowest cutoff (Hz) that corrects anything of a motion: one period in its duration.
+pub(super) fn lowest_cutoff_hz(trajectory: &Trajectory) -> f64 {
+    1.0 / trajectory.duration()
+}
+
 /// A motion on the model, with the desired TCP poses.
 pub(super) struct Job<'a> {
     arm: &'a Arc<Arm>,
@@ -302,13 +307,16 @@ impl<'a> Job<'a> {
     }
 
     /// Corrects the commands by the inverse of the arm until the error settles. An iteration that
-    /// increases the error by more than a factor of 1/[`SETTLED`] is discarded, and the next one
-    /// corrects up to half the frequency.
+    /// increases the RMS or the largest error by more than a factor of 1/[`SETTLED`] is discarded,
+    /// and the next one corrects up to half the frequency.
     pub(super) fn dynamic(&self) -> Result<Commands, Error> {
         let mut inversion = self.inversion()?;
         let (m, N) = self.q.shape();
         let within = |error: &DMatrix<f64>| error.columns(0, N).into_owned();
-        let size = |error: &DMatrix<f64>| error.select_rows(&self.rows).norm();
+        let size = |error: &DMatrix<f64>| {
+            let rows = error.select_rows(&self.rows);
+            [rows.norm(), rows.amax()]
+        };
         let mut beyond = self.samples_beyond(&inversion);
         let mut whole = self.error(&DMatrix::zeros(m, N), beyond)?;
         let mut error = within(&whole);
@@ -324,23 +332,28 @@ impl<'a> Job<'a> {
         };
         let first = size(&error);
         let mut least = first;
-        for iteration in 1..=self.request.iterations {
+        let most = if first[0] > 0.0 { self.request.iterations } else { 0 };
+        for iteration in 1..=most {
             let y = -whole.select_rows(&self.rows);
             let change = &best.change + inversion.commands(&y, self.step_s()).columns(0, N);
             let next = self.error(&change, beyond)?;
             let left = size(&within(&next));
-            if left.is_nan() || left > least / SETTLED {
+            let growth = if left[0].is_nan() { f64::NAN } else { (left[0] / least[0]).max(left[1] / least[1]) };
+            if growth.is_nan() || growth > 1.0 / SETTLED {
                 let cutoff_hz = inversion.cutoff_hz();
-                best.discarded.push(Discarded { iteration, cutoff_hz, growth: left / least });
+                best.discarded.push(Discarded { iteration, cutoff_hz, growth });
+                if 0.5 * cutoff_hz < lowest_cutoff_hz(&self.motion.trajectory) {
+                    break;
+                }
                 inversion = inversion.below(0.5 * cutoff_hz);
                 beyond = self.samples_beyond(&inversion);
                 whole = self.error(&best.change, beyond)?;
                 continue;
             }
-            if left >= least {
+            if growth >= 1.0 {
                 break;
             }
-            let settled = left > SETTLED * least || left < ENOUGH * first;
+            let settled = growth > SETTLED || left[0] < ENOUGH * first[0];
             (least, best.motion, best.change) = (left, self.moved(&change)?, change);
             best.kept += 1;
             best.peaks.push(peak(&within(&next)));

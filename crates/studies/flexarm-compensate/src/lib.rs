@@ -47,7 +47,7 @@ pub use error::CompensateError;
 use files::Files;
 use flexarm_run::caveat::{Use, once_each, warnings};
 use flexarm_run::{Arm, Error, Finding, Modelling, Motion, MotionViolation, Robot, RunOptions, Scenario};
-use job::Job;
+use job::{Job, lowest_cutoff_hz};
 use judge::{Judge, sweep};
 pub use limits::LimitRule;
 pub use program::{LeftTarget, ProgramFigures};
@@ -362,6 +362,10 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Re
     }
     if let Some(hz) = request.cutoff_hz.filter(|hz| *hz > 0.5 / found) {
         let expected = "at most half the number of steps per second (Hz)";
+        return Err(value("the cutoff", hz, expected));
+    }
+    if let Some(hz) = request.cutoff_hz.filter(|hz| *hz < lowest_cutoff_hz(&motion.trajectory)) {
+        let expected = "at least one period in the duration of the motion (Hz)";
         return Err(value("the cutoff", hz, expected));
     }
     let found = motion.trajectory.duration();

@@ -294,7 +294,12 @@ pub fn map(
     found.caveats.extend(caveats);
     found.caveats.extend(one_place(&found));
     found.caveats.extend((done < all).then(|| unfinished(done, all)));
-    found.caveats.extend(request.tool.iter().flat_map(flexarm_chatter::tool_caveats));
+    if let Some(tool) = &request.tool {
+        found.caveats.extend(flexarm_chatter::tool_caveats(tool, tool.deepest));
+        if let MapRegion::Along { motion, .. } = &request.region {
+            found.caveats.extend(flexarm_chatter::feed_caveat(robot, tool, motion)?);
+        }
+    }
     found.caveats.extend(caveat::validity::outside_limits(actuated, &near).filter(|_| request.at.is_some()));
     found.caveats.extend(validity(robot, request, &found));
     found.warnings = caveat::warnings(&found.caveats);

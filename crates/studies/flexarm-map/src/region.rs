@@ -1,6 +1,10 @@
 //! Region of a map: TCP positions on a grid, joint positions, or a motion; and the tool directions.
 
+use std::f64::consts::FRAC_PI_2;
+
 use flexarm_kinematics::Pose;
+use flexarm_run::Finding;
+use flexarm_run::caveat::{UNUSUAL, slip};
 use flexarm_settings::Setting;
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, Vector3};
 
@@ -75,7 +79,25 @@ impl Default for ToolDirections {
     }
 }
 
+/// Minimum half angle of a cone (rad): a degree.
+const NARROW: f64 = 1.0 / slip::DEGREES;
+
 impl ToolDirections {
+    /// Returns a caveat for angles that are as small as if radians were taken for degrees: a narrow
+    /// cone, and a right angle (1.57) as the roll.
+    pub(crate) fn caveat(&self) -> Option<Finding> {
+        let kind = UNUSUAL.with_unit("degrees");
+        let quarters = self.roll_rad.to_degrees() / FRAC_PI_2;
+        let right = quarters != 0.0 && quarters.abs() < 4.5 && (quarters - quarters.round()).abs() < 1e-3;
+        let (what, angle, least) = match (self.cone_rad > 0.0 && self.cone_rad < NARROW, right) {
+            (true, _) => ("the half angle of the cone", self.cone_rad, NARROW),
+            (false, true) => ("the roll of the tool", self.roll_rad, quarters.abs() * FRAC_PI_2),
+            _ => return None,
+        };
+        let found = kind.found(what, angle.to_degrees(), least.to_degrees());
+        Some(found.likely("about 57 times too small: radians?"))
+    }
+
     /// Returns the rotations of the tool in the world: tilts, and for each of them the rolls.
     ///
     /// # Errors

@@ -13,8 +13,11 @@ const EFFORT: f64 = 0.85;
 const WEIGHT: f64 = 0.7;
 /// Maximum joint speed of the motion, independent of the limit (rad/s, m/s).
 const FASTEST: f64 = 2.5;
-/// Ratios of the peaks of a quintic to the means: speed 15/8 D/T, acceleration 10/√3 D/T².
-const PEAKS: [f64; 2] = [1.875, 5.773_502_691_896_258];
+/// Share of the limits of acceleration and jerk used by the motion.
+const WITHIN: f64 = 0.95;
+/// Ratios of the peaks of a quintic to the means: speed 15/8 D/T, acceleration 10/√3 D/T², jerk
+/// 60 D/T³.
+const PEAKS: [f64; 3] = [1.875, 5.773_502_691_896_258, 60.0];
 /// Half of the maximum distance of a joint over its speed limit (s): 8 s at 60 % of it.
 pub(crate) const LONGEST_WAY: f64 = 1.28;
 /// Maximum number of rests in addition to the start.
@@ -188,8 +191,10 @@ fn duration(model: &Model, data: &mut Data, at: &DVector<f64>, axes: &[Axis], [f
     let mut time = 0.2f64;
     for (axis, way) in axes.iter().zip(from.iter().zip(to).map(|(a, b)| (b - a).abs())) {
         let speed = (SPEED * axis.speed).min(FASTEST);
-        let acceleration = speed / SPEED_UP;
+        let limits = &model.coordinates()[axis.k].limits;
+        let acceleration = (speed / SPEED_UP).min(WITHIN * limits.acceleration);
         time = time.max(PEAKS[0] * way / speed).max((PEAKS[1] * way / acceleration).sqrt());
+        time = time.max((PEAKS[2] * way / (WITHIN * limits.jerk)).cbrt());
     }
     let tenths = |time: f64| (10.0 * time - 1e-9).ceil() / 10.0;
     time = tenths(time);

@@ -36,6 +36,7 @@ use serde::Serialize;
 use flexarm_identify::parameters::{asks_for, fits};
 use flexarm_run::caveat::{Use, once_each, warnings};
 use flexarm_run::prepare::{loaded, runnable};
+use flexarm_run::run::BeforeRun;
 use flexarm_run::{Arm, Error, Finding, Modelling, Robot, RunOptions, Scenario};
 
 use controllers::{add_controllers, limited};
@@ -165,7 +166,8 @@ fn slopes_and_caveats(
     }
     flexarm_run::loops::along_motion(&arm.rigid, &scenario.motion.trajectory)?;
     let unloaded = arm.plant(scenario.motion.prescribed()).map_err(|error| arm.explained(error))?;
-    let (_, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
+    let (ready, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
+    caveats.extend(BeforeRun { arm, plant: &ready, motion: &scenario.motion, options }.of_steps());
     let run = ExactRun {
         settings,
         step_s: options.step_s,

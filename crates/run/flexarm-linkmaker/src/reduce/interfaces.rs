@@ -169,6 +169,9 @@ impl MeshFrame<'_> {
         nodes.extend(&seat.missing);
         nodes.sort_unstable();
         let (centroid, extent) = self.middle_and_extent(&nodes);
+        if let Some(angle) = entry.rpy.iter().flatten().find(|angle| angle.abs() > std::f64::consts::TAU) {
+            return Err(fail(format!("rpy has {angle} rad, more than a turn: angles are in rad, are these degrees?")));
+        }
         let turned = |position: Vector3<f64>| {
             let frame = FrameEntry { xyz: (position / self.unit).into(), rpy: entry.rpy.unwrap_or_default() };
             pose(&frame, self.unit)

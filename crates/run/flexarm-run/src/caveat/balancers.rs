@@ -1,12 +1,12 @@
 //! Caveats about balancers relative to the weight they carry, and about their range of length over
 //! the joint ranges.
 
-use flexarm_kinematics::{BalancerLaw, Data, Mechanism, Model, forward_kinematics, gravity_forces};
+use flexarm_kinematics::{BalancerLaw, BalancerSpan, Data, Mechanism, Model, forward_kinematics, gravity_forces};
 use nalgebra::DVector;
 
 use super::size::spread_poses;
 use super::slip::{EFFORT, Factor, slip};
-use super::{Finding, kinds};
+use super::{Finding, kinds, parts};
 
 /// Maximum balancer torque relative to the maximum gravity torque: note, warning.
 const STRONG: [f64; 2] = [3.0, 10.0];
@@ -34,6 +34,9 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Finding>
             }
             BalancerLaw::Curve(curve) => {
                 let [first, last] = curve.range();
+                let end = first.abs().max(last.abs());
+                let turns = alone(mechanism, &bare, k).unit == "N m" && over_joint(mechanism, k);
+                caveats.extend(turns.then(|| parts::angles(&format!("the curve of {name}"), &[end])).flatten());
                 let outside = if least < first { Some((least, first)) } else { (most > last).then_some((most, last)) };
                 caveats.extend(outside.map(|(x, end)| kinds::BALANCER_CURVE.found(&name, x, end)));
             }
@@ -50,9 +53,8 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Finding>
             let factors: Vec<Factor> = gas.into_iter().chain([(1e-3, "kN, kN m or N/mm")]).collect();
             let likely = slip(torque, &(0.03 * weight..=STRONG[0] * weight), &factors, 1.0);
             let caveat = kinds::BALANCER_WEAK.with_unit(alone.unit).found(&name, torque, WEAK * weight).likely(likely);
-            // A gas spring that reaches its free length is weak in some poses; a cylinder with a pressure is not.
-            let cylinder = matches!(&balancer.law, BalancerLaw::Gas(gas) if gas.pulls);
-            caveats.push(if cylinder { caveat } else { caveat.as_note() });
+            // A gas spring that reaches its free length is weak in some poses, and then no unit explains it.
+            caveats.push(if caveat.likely.is_empty() { caveat.as_note() } else { caveat });
         }
         if weight > 0.0 && alone.with > RAISED * alone.without {
             let caveat = kinds::BALANCER_SIDE.with_unit(alone.unit).found(&name, alone.with, alone.without);
@@ -60,6 +62,11 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Finding>
         }
     }
     caveats
+}
+
+/// Whether a balancer acts on a joint, not between two points.
+fn over_joint(mechanism: &Mechanism, number: usize) -> bool {
+    matches!(mechanism.balancers[number].span, BalancerSpan::Joint { .. })
 }
 
 /// Minimum and maximum length of a balancer.

@@ -105,20 +105,22 @@ fn stiff_joints(robot: &Robot) -> Vec<Finding> {
     let mut chain: Vec<(&Joint, bool)> = Vec::new();
     let mut link = robot.tcp.0.as_str();
     while let Some(joint) = mechanism.joints.iter().find(|joint| joint.child == link) {
-        if moving.contains(&joint.name) && joint.kind.turns() {
+        if moving.contains(&joint.name) {
             chain.push((joint, yields(joint)));
         }
         link = &joint.parent;
     }
-    let elastic = chain.iter().filter(|(_, yields)| *yields).count();
-    // Rigid last wrist joints are usual, unless there is only one.
+    // Rigid last joints, as of wrists and of the quill of a SCARA, are usual, unless there is only one.
     let outermost = chain.iter().position(|(_, yields)| *yields).unwrap_or(0);
-    let first = if outermost == 1 { 0 } else { outermost };
-    let odd: Vec<&Joint> = chain[first..].iter().rev().filter(|(_, yields)| !yields).map(|(joint, _)| *joint).collect();
-    if chain.len() < FEWEST || odd.len() >= elastic {
+    let last = chain.drain(..if outermost == 1 { 0 } else { outermost }).count();
+    chain.retain(|(joint, _)| joint.kind.turns());
+    let elastic = chain.iter().filter(|(_, yields)| *yields).count();
+    let odd: Vec<&Joint> = chain.iter().rev().filter(|(_, yields)| !yields).map(|(joint, _)| *joint).collect();
+    let all = chain.len() + last;
+    if all < FEWEST || odd.len() >= elastic {
         return Vec::new();
     }
-    let all = chain.len() as f64;
+    let all = all as f64;
     let caveat = |joint: &Joint| kinds::STIFF_JOINT.found(format!("joint {:?}", joint.name), elastic as f64, all);
     odd.into_iter().map(caveat).collect()
 }

@@ -8,9 +8,10 @@ use flexarm_kinematics::{Mechanism, Model};
 
 use super::links::{CREEP, USUAL_DAMPING};
 use super::size::inertia_moved;
-use super::slip::{self, slip};
+use super::slip::{self, outside, slip};
 use super::{Finding, kinds};
 use crate::robot::drive_entry::{Drive, DriveKind};
+use crate::robot::gearbox_entry::GearDamping;
 
 /// Effort limit above which drives have stiff gears (N m); weaker drives may contain springs on
 /// purpose.
@@ -53,8 +54,12 @@ const ROTOR: f64 = 10.0;
 const SMOOTHING: f64 = 0.1;
 /// Range of the sampling period of a servo (s).
 const SAMPLE: RangeInclusive<f64> = 1e-6..=0.05;
-/// Maximum gain of a position loop (1/s).
-const POSITION_GAIN: f64 = 1000.0;
+/// Range of the gain of a position loop (1/s).
+const GAIN: RangeInclusive<f64> = 0.1..=1000.0;
+/// Range of the torque limit of a servo over the effort limit of its joint.
+const LIMIT: RangeInclusive<f64> = 0.01..=30.0;
+/// Minimum velocity gain over inertia (1/s): a slower speed loop does not follow a motion.
+const FOLLOWS: f64 = 0.5;
 /// Stability limit of a sampled velocity loop: velocity gain times sampling period divided by the
 /// high-frequency inertia.
 const STABLE: f64 = 2.0;
@@ -74,16 +79,10 @@ pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) 
         caveats.extend(motor(drive, heaviest));
         caveats.extend(friction(drive, effort, speed));
         caveats.extend(smoothing(drive, speed));
-        if drive.load_friction > LOAD_FRICTION {
-            let caveat = kinds::LOAD_FRICTION.found(name(drive), drive.load_friction, LOAD_FRICTION);
-            caveats.push(caveat.likely(slip(
-                drive.load_friction,
-                &(1e-3..=LOAD_FRICTION),
-                &[(100.0, "per cent")],
-                1.0,
-            )));
-        }
-        caveats.extend(servo(drive));
+        let per_cent = &[(100.0, "per cent")];
+        let load = drive.load_friction;
+        caveats.extend(outside(&kinds::LOAD_FRICTION, name(drive), load, &(0.0..=LOAD_FRICTION), per_cent, 1.0));
+        caveats.extend(servo(drive, effort));
         if !slides && drive.kind != DriveKind::Prescribed {
             caveats.extend(gear(drive, effort, others_turn(drive, drives, mechanism)));
             caveats.extend(errors(drive));
@@ -113,6 +112,13 @@ fn stiffness(drive: &Drive) -> Option<(f64, Option<f64>)> {
     }
 }
 
+/// Returns damping over stiffness of each spring of a gear (s).
+fn relaxations(gear: &GearDamping, stiffness: &GearStiffness, least: f64) -> Vec<f64> {
+    let springs = stiffness.each().unwrap_or_default();
+    let dampers = gear.dampers.iter().flatten().enumerate();
+    dampers.map(|(i, d)| d / springs.get(i).copied().unwrap_or(least)).collect()
+}
+
 /// Returns the median rotation of the other strong gears under their effort limits (rad); None for
 /// a weak gear, or with fewer than two others.
 fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option<f64> {
@@ -130,7 +136,7 @@ fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option
 /// Checks stiffness, damping and backlash of a gearbox; `others`: median rotation of the robot's
 /// other gears (rad).
 fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Finding> {
-    let (Some((k, along)), Some((_, gear))) = (stiffness(drive), &drive.gearbox) else { return Vec::new() };
+    let (Some((k, along)), Some((springs, gear))) = (stiffness(drive), &drive.gearbox) else { return Vec::new() };
     let mut caveats = Vec::new();
     let turned = effort / k;
     let [unusual, wrong] = if effort > STRONG { TURNED } else { TURNED_WEAK };
@@ -149,24 +155,20 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Finding> {
         caveats.push(if turned < RIGID[1] { caveat } else { caveat.as_note() });
     }
     if let Some(along) = along {
-        let lever = (k / along).sqrt();
-        let end = if lever < *LEVER.start() { *LEVER.start() } else { *LEVER.end() };
-        let caveat = kinds::LEVER.found(name(drive), lever, end);
         let factors = &[(1e3, "translations in kN/m or N/mm"), (1.0 / 57.3, "rotations per degree")];
-        caveats.extend((!LEVER.contains(&lever)).then(|| caveat.likely(slip(lever, &LEVER, factors, 0.5))));
+        caveats.extend(outside(&kinds::LEVER, name(drive), (k / along).sqrt(), &LEVER, factors, 0.5));
     }
     if gear.dampers.as_ref().is_some_and(|dampers| dampers.iter().all(|damper| *damper == 0.0)) {
         caveats.push(kinds::NO_DAMPING.found(name(drive), 0.0, USUAL_DAMPING));
     }
-    let relaxation = gear.dampers.iter().flatten().map(|d| d / k).fold(0.0, f64::max);
-    if gear.dampers.as_ref().is_some_and(|d| d.len() == 1) && relaxation > CREEP {
+    let relaxations = relaxations(gear, &springs.stiffness, k);
+    let relaxation = relaxations.iter().copied().fold(0.0, f64::max);
+    if relaxations.len() == 1 && relaxation > CREEP {
         caveats.push(kinds::CREEP.found(name(drive), relaxation, CREEP));
     }
-    if relaxation > 0.0 && relaxation < UNDAMPED {
-        let factors = &[(1e-3, "kN m s/rad or per ms"), (1.0 / slip::DEGREES, "N m s/deg")];
-        let likely = slip(relaxation, &(1e-4..=1e-2), factors, 1.0);
-        caveats.push(kinds::GEAR_UNDAMPED.found(name(drive), relaxation, UNDAMPED).likely(likely));
-    }
+    let least = relaxations.into_iter().filter(|time| *time > 0.0).fold(f64::INFINITY, f64::min);
+    let factors = &[(1e-3, "kN m s/rad or per ms"), (1.0 / slip::DEGREES, "N m s/deg")];
+    caveats.extend(outside(&kinds::GEAR_UNDAMPED, name(drive), least, &(UNDAMPED..=f64::INFINITY), factors, 1.0));
     let [play, _] = drive.play(false);
     if play > PLAY[0] {
         let likely = slip(play, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);
@@ -232,37 +234,43 @@ fn friction(drive: &Drive, effort: f64, speed: f64) -> Option<Finding> {
     })
 }
 
-/// Checks whether friction acts well below the speed limit.
+/// Checks whether friction acts well below the speed limit, and changes to its rest below it.
 fn smoothing(drive: &Drive, speed: f64) -> Option<Finding> {
     let f = &drive.friction;
     let rubs = f.coulomb + f.stribeck + drive.load_friction > 0.0;
-    let (width, most) = (f.regularisation, SMOOTHING * speed);
-    let caveat = || kinds::FRICTION_SMOOTHING.found(name(drive), width, most);
-    (rubs && width > most).then(|| caveat().likely(slip(width, &(1e-4..=most), &slip::ANGLE[..1], 1.0)))
+    let most = SMOOTHING * speed;
+    let within = |name: String, value: f64, most: f64| {
+        outside(&kinds::FRICTION_SMOOTHING, name, value, &(0.0..=most), &slip::ANGLE[..1], 1.0)
+    };
+    let stribeck = || within(format!("stribeck_velocity of {}", name(drive)), f.stribeck_velocity, speed);
+    let smooth = rubs.then(|| within(name(drive), f.regularisation, most)).flatten();
+    smooth.or_else(|| (f.stribeck > 0.0).then(stribeck).flatten())
 }
 
-/// Checks sampling and position gain of a servo.
-fn servo(drive: &Drive) -> Vec<Finding> {
+/// Checks sampling, position gain and torque limit of a servo.
+fn servo(drive: &Drive, effort: f64) -> Vec<Finding> {
     let mut caveats = Vec::new();
     if drive.kind != DriveKind::Torque {
         return caveats;
     }
-    if let Some(sample) = drive.servo.sample_s.filter(|s| !SAMPLE.contains(s)) {
-        let end = if sample < *SAMPLE.start() { *SAMPLE.start() } else { *SAMPLE.end() };
-        let likely = slip(sample, &(1e-5..=0.02), &[(1e3, "milliseconds")], 1.0);
-        caveats.push(kinds::SAMPLE.found(name(drive), sample, end).likely(likely));
-    }
-    if let Some(gain) = drive.servo.position_gain.filter(|g| *g > POSITION_GAIN) {
-        caveats.push(kinds::POSITION_GAIN.found(name(drive), gain, POSITION_GAIN));
-    }
+    let (sample, gain) = (drive.servo.sample_s, drive.servo.position_gain.filter(|gain| *gain != 0.0));
+    let late = &[(1e3, "milliseconds")];
+    caveats.extend(sample.and_then(|s| outside(&kinds::SAMPLE, name(drive), s, &SAMPLE, late, 1.0)));
+    caveats.extend(gain.and_then(|g| outside(&kinds::POSITION_GAIN, name(drive), g, &GAIN, &[], 1.0)));
+    let limit = drive.torque_limit / effort;
+    let what = format!("torque_limit of {} over its effort limit", name(drive));
+    let limited = effort.is_finite() && drive.torque_limit.is_finite();
+    caveats.extend(limited.then(|| outside(&kinds::UNUSUAL, what, limit, &LIMIT, slip::EFFORT, 1.0)).flatten());
     caveats
 }
 
-/// Checks whether a velocity gain makes the sampled loop unstable; `inertia` is the
-/// high-frequency inertia (kg m²).
+/// Checks whether a velocity gain makes the sampled loop unstable, or too slow to follow;
+/// `inertia` is the high-frequency inertia (kg m²).
 pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) -> Option<Finding> {
-    let most = STABLE * inertia / sample_s;
-    (inertia > 0.0 && gain > most).then(|| kinds::VELOCITY_GAIN.found(format!("joint {joint:?}"), gain, most))
+    let range = FOLLOWS * inertia..=STABLE * inertia / sample_s;
+    let name = || format!("joint {joint:?}");
+    let judge = || outside(&kinds::VELOCITY_GAIN, name(), gain, &range, &[(1e-3, "kN m s/rad")], 1.0);
+    (inertia > 0.0 && gain != 0.0).then(judge).flatten()
 }
 
 /// Checks the deflection of a drive's spring, in rotation (rad) and translation (m); `times` scales

@@ -4,9 +4,8 @@ use std::ops::RangeInclusive;
 
 use nalgebra::Vector3;
 
-use super::links::outside;
 use super::size::Size;
-use super::slip::{self, slip};
+use super::slip::{self, outside, slip};
 use super::{Finding, kinds};
 use crate::robot::Robot;
 use crate::robot::calibration_entry::Calibration;
@@ -47,8 +46,8 @@ fn strength(link: &RobotLink) -> Vec<Finding> {
     let name = |what: &str| format!("the {what} strength of link {:?}", link.flexible.link);
     let factors = &[(1e-6, "MPa"), (1e-9, "GPa"), (1e3, "GPa for MPa")];
     let mut caveats = Vec::new();
-    caveats.extend(outside(&kinds::STRENGTH, &name("yield"), strength.yield_pa, &STRENGTH, factors));
-    caveats.extend(outside(&kinds::STRENGTH, &name("tensile"), strength.tensile_pa, &STRENGTH, factors));
+    caveats.extend(outside(&kinds::STRENGTH, name("yield"), strength.yield_pa, &STRENGTH, factors, 1.0));
+    caveats.extend(outside(&kinds::STRENGTH, name("tensile"), strength.tensile_pa, &STRENGTH, factors, 1.0));
     if let Some(fatigue) = strength.fatigue_pa {
         let share = fatigue / strength.tensile_pa;
         let end = if share < *FATIGUE.start() { *FATIGUE.start() } else { *FATIGUE.end() };
@@ -107,9 +106,7 @@ fn of_guides(robot: &Robot) -> Vec<Finding> {
         let name = |what: &str| format!("{what} of the guide of joint {:?}", drive.joint);
         let far = FAR * size.extent.max(1.0);
         for (what, end) in [("outer_end", tubes.outer_end), ("inner_end", tubes.inner_end)] {
-            let likely = || slip(end.abs(), &(0.0..=far), slip::LENGTH, 1.0);
-            let caveat = || kinds::GUIDE_END.found(name(what), end, size.extent).likely(likely());
-            caveats.extend((end.abs() > far).then(caveat));
+            caveats.extend(outside(&kinds::GUIDE_END, name(what), end, &(-far..=far), slip::LENGTH, 1.0));
         }
         let Some(joint) = robot.rigid.joints.iter().find(|joint| joint.name == drive.joint) else { continue };
         let tilts = drive.gearbox.iter().flat_map(|(_, damping)| &damping.tilts);
@@ -121,13 +118,13 @@ fn of_guides(robot: &Robot) -> Vec<Finding> {
             let angle = moment * (c0 + c1 / overlap + c2 / (overlap * overlap));
             let factors =
                 &[(1e-3, "compliance per kN m"), (1e3, "compliance per N mm or in mrad"), (slip::DEGREES, "degrees")];
-            caveats.extend(outside(&kinds::GUIDE_TILT, &name("compliance"), angle, &TILT, factors));
+            caveats.extend(outside(&kinds::GUIDE_TILT, name("compliance"), angle, &TILT, factors, 1.0));
             let Some(play) = tilt.play else { continue };
             let limits = TRANSITION.start() * moment..=TRANSITION.end() * moment;
             let units = &[(1e-3, "kN m"), (1e3, "N mm")];
-            caveats.extend(outside(&kinds::GUIDE_PLAY, &name("play.width"), play.width, &limits, units));
+            caveats.extend(outside(&kinds::GUIDE_PLAY, name("play.width"), play.width, &limits, units, 1.0));
             let centred = -TRANSITION.end() * moment..=TRANSITION.end() * moment;
-            caveats.extend(outside(&kinds::GUIDE_PLAY, &name("play.centre"), play.centre, &centred, units));
+            caveats.extend(outside(&kinds::GUIDE_PLAY, name("play.centre"), play.centre, &centred, units, 1.0));
         }
     }
     caveats
@@ -142,9 +139,8 @@ fn calibration(of: &Calibration) -> Vec<Finding> {
         ("rpy", of.frame.rotation.angle(), most_rad, slip::ANGLE),
         ("xyz", of.frame.translation.vector.norm(), most_m, slip::LENGTH),
     ];
-    let found = values.into_iter().filter(|(_, value, most, _)| value > most);
-    let caveat = |(what, value, most, factors): (&str, f64, f64, &[slip::Factor])| {
-        kinds::CALIBRATION.found(name(what), value, most).likely(slip(value, &(0.0..=most), factors, 1.0))
+    let judge = |(what, value, most, factors): (&str, f64, f64, &[slip::Factor])| {
+        outside(&kinds::CALIBRATION, name(what), value, &(0.0..=most), factors, 1.0)
     };
-    found.map(caveat).collect()
+    values.into_iter().filter_map(judge).collect()
 }

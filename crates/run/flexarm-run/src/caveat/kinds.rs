@@ -524,16 +524,16 @@ pub(crate) const SAMPLE: FindingKind = FindingKind::warning(
 /// The position gain is implausibly high.
 pub(crate) const POSITION_GAIN: FindingKind = FindingKind::warning(
     "position-gain",
-    "the position gain of {where} is {value} 1/s, position loops are slower than {yardstick}",
+    "the position gain of {where} is {value} 1/s, usual values end at {yardstick}",
     "1/s",
     "position_gain is in 1/s: 5 to 50",
 );
 /// The velocity gain makes the sampled loop unstable.
 pub(crate) const VELOCITY_GAIN: FindingKind = FindingKind::warning(
     "velocity-gain",
-    "the velocity gain of {where} is {value} N m s/rad, its sampled loop is unstable above {yardstick}",
+    "the velocity gain of {where} is {value} N m s/rad, sampled loops follow and are stable up to {yardstick}",
     "N m s/rad",
-    "lower it, sample faster, or give motor_inertia",
+    "velocity_gain over the inertia is the bandwidth in rad/s; faster sampling allows more",
 );
 
 /// A joint is rigid although others of the arm are elastic.

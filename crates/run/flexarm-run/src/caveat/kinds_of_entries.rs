@@ -2,6 +2,13 @@
 
 use super::FindingKind;
 
+/// A number is outside the range of usual ones.
+pub const UNUSUAL: FindingKind = FindingKind::warning(
+    "unusual",
+    "{where} is {value} {unit}, usual values end at {yardstick}",
+    "",
+    "check the number and its unit (`flexarm format` lists the units of every key)",
+);
 /// A strength is outside that of materials.
 pub(crate) const STRENGTH: FindingKind = FindingKind::warning(
     "strength",
@@ -68,7 +75,7 @@ pub(crate) const GEAR_UNDAMPED: FindingKind = FindingKind::warning(
 /// Friction is smoothed over most speeds of the joint.
 pub(crate) const FRICTION_SMOOTHING: FindingKind = FindingKind::warning(
     "friction-smoothing",
-    "friction of {where} reaches its value at {value} rad/s only, more than a tenth of the speed limit ({yardstick})",
+    "friction of {where} reaches its value at {value} rad/s only, it should at {yardstick} by the speed limit",
     "rad/s",
     "regularisation is the speed in rad/s at which friction has three quarters of its value: 0.01",
 );

@@ -9,8 +9,9 @@ use flexarm_kinematics::LinkInertia;
 use flexarm_settings::Setting;
 use flexarm_stepping::Damping;
 
-use super::slip::{self, slip};
-use super::{Finding, FindingKind, kinds};
+use super::size::gyration;
+use super::slip::{self, outside, slip};
+use super::{Finding, kinds};
 use crate::arm::options::LinkModel;
 use crate::body_change::BodyChange;
 use crate::robot::Robot;
@@ -31,6 +32,9 @@ const THICK: f64 = 3.0;
 const SLENDER: RangeInclusive<f64> = 5e-4..=1.0;
 /// Range of torsional stiffness relative to bending stiffness.
 const TORSION: RangeInclusive<f64> = 1e-3..=1e3;
+/// Range of shear stiffness relative to axial stiffness: from lattices to thick walls of low
+/// modulus; 0.1 to 0.35 for one material.
+const SHEAR: RangeInclusive<f64> = 1e-3..=1.0;
 /// Range of the radius of gyration of a section by its mass, relative to that by its stiffness.
 const ROTARY: RangeInclusive<f64> = 0.1..=10.0;
 /// Maximum tip deflection due to an eccentric shear centre, relative to that of bending.
@@ -117,6 +121,9 @@ const SINKS: [f64; 2] = [1e-3, 5e-3];
 /// Minimum sink (m): even the softest of stiff springs gives more.
 const RIGID_SINK: f64 = 1e-9;
 
+/// Maximum radius of gyration of a body on the springs (m).
+const FOUNDATION: f64 = 20.0;
+
 /// Checks the springs under the base.
 pub(crate) fn of_mounting(robot: &Robot) -> Vec<Finding> {
     let Some(RobotMounting::Springs { springs, damping: damped, .. }) = &robot.mounting else { return Vec::new() };
@@ -126,44 +133,25 @@ pub(crate) fn of_mounting(robot: &Robot) -> Vec<Finding> {
     let weight = 9.81 * (links.sum::<f64>() + springs.inertia.map_or(0.0, |inertia| inertia.mass));
     let K = &springs.K_S;
     let least = |first: usize| (first..first + 3).map(|i| K[(i, i)]).fold(f64::INFINITY, f64::min);
-    let sink = weight / least(0);
-    if sink > SINKS[0] {
-        let likely =
-            slip(sink, &(1e-7..=SINKS[0]), &[(1e3, "stiffness in kN/m or N/mm"), (1e6, "stiffness in kN/mm")], 1.0);
-        caveats.push(kinds::MOUNTING_SINK.found(&name, sink, SINKS[0]).likely(likely));
-    }
-    if sink < RIGID_SINK {
-        let likely = slip(sink, &(1e-8..=SINKS[0]), &[(1e-6, "stiffness in uN/m"), (1e-3, "stiffness in mN/m")], 1.0);
-        caveats.push(kinds::MOUNTING_RIGID.found(&name, sink, RIGID_SINK).likely(likely));
-    }
-    // Moment of the weight at a lever of 1 m.
-    let tilt = weight / least(3);
-    if tilt > SINKS[1] {
-        let likely =
-            slip(tilt, &(1e-7..=SINKS[1]), &[(57.3, "stiffness in N m/deg"), (1e3, "stiffness in kN m/rad")], 1.0);
-        caveats.push(kinds::MOUNTING_TILT.found(&name, tilt, SINKS[1]).likely(likely));
-    }
+    let (sink, tilt) = (weight / least(0), weight / least(3));
+    let soft = &[(1e3, "stiffness in kN/m or N/mm"), (1e6, "stiffness in kN/mm")];
+    let stiff = &[(1e-6, "stiffness in uN/m"), (1e-3, "stiffness in mN/m")];
+    let turned = &[(57.3, "stiffness in N m/deg"), (1e3, "stiffness in kN m/rad")];
+    caveats.extend(outside(&kinds::MOUNTING_SINK, &name, sink, &(f64::MIN..=SINKS[0]), soft, 1.0));
+    caveats.extend(outside(&kinds::MOUNTING_RIGID, &name, sink, &(RIGID_SINK..=f64::MAX), stiff, 1.0));
+    caveats.extend(outside(&kinds::MOUNTING_TILT, &name, tilt, &(f64::MIN..=SINKS[1]), turned, 1.0));
+    let radius = springs.inertia.filter(|own| own.mass > 0.0).map_or(0.0, |own| gyration(&own));
+    let what = format!("the radius of gyration of {name}");
+    caveats.extend(outside(&kinds::UNUSUAL.with_unit("m"), what, radius, &(0.0..=FOUNDATION), slip::INERTIA, 0.5));
     caveats
 }
 
 /// Checks elastic constants and density.
 fn material(name: &str, material: &Material) -> impl Iterator<Item = Finding> {
-    let young = outside(&kinds::MODULUS, name, material.E, &YOUNG, slip::MODULUS);
-    let rho = outside(&kinds::MATERIAL_DENSITY, name, material.rho, &RHO, slip::DENSITY);
-    let nu = outside(&kinds::POISSON, name, material.nu, &NU, &[(100.0, "per cent")]);
+    let young = outside(&kinds::MODULUS, name, material.E, &YOUNG, slip::MODULUS, 1.0);
+    let rho = outside(&kinds::MATERIAL_DENSITY, name, material.rho, &RHO, slip::DENSITY, 1.0);
+    let nu = outside(&kinds::POISSON, name, material.nu, &NU, &[(100.0, "per cent")], 1.0);
     young.into_iter().chain(rho).chain(nu)
-}
-
-/// Returns a caveat if a value is outside its range, with the nearer end as threshold.
-pub(super) fn outside(
-    kind: &FindingKind,
-    name: &str,
-    value: f64,
-    range: &RangeInclusive<f64>,
-    factors: &[slip::Factor],
-) -> Option<Finding> {
-    let end = if value < *range.start() { *range.start() } else { *range.end() };
-    (!range.contains(&value)).then(|| kind.found(name, value, end).likely(slip(value, range, factors, 1.0)))
 }
 
 /// Checks the section relative to the beam's length, and its mass relative to the link's.
@@ -181,10 +169,13 @@ fn section(name: &str, beam: &BeamLink) -> Vec<Finding> {
         let radius = (bending / bar.EA).sqrt();
         let factors = &[(1e6, "N mm2"), (1e-6, "EA in N beside EI in MN m2"), (1e-3, "kN m2"), (1e3, "EA in kN")];
         let range = SLENDER.start() * length..=SLENDER.end() * length;
-        let end = if radius < *range.start() { *range.start() } else { *range.end() };
-        let caveat = kinds::SECTION_RADIUS.found(name, radius, end);
-        caveats.extend((!range.contains(&radius)).then(|| caveat.likely(slip(radius, &range, factors, 0.5))));
-        caveats.extend(outside(&kinds::TORSION, name, bar.GJ / bending, &TORSION, &[]));
+        caveats.extend(outside(&kinds::SECTION_RADIUS, name, radius, &range, factors, 0.5));
+        caveats.extend(outside(&kinds::TORSION, name, bar.GJ / bending, &TORSION, &[], 1.0));
+        let shear = bar.kGA_y.into_iter().chain(bar.kGA_z).fold(f64::INFINITY, f64::min) / bar.EA;
+        let what = format!("kGA over EA of {name}");
+        let factors = &[(1e-3, "kN"), (1e3, "EA in kN")];
+        let given = shear.is_finite().then(|| outside(&kinds::UNUSUAL, what, shear, &SHEAR, factors, 1.0));
+        caveats.extend(given.flatten());
         // A section of one material has I_y from its mass as from its stiffness.
         let turns = (bar.rotary_y.max(bar.rotary_z) / bar.mass_per_length).sqrt();
         let far = turns > 0.0 && !ROTARY.contains(&(turns / radius));
@@ -261,7 +252,7 @@ fn damping(name: &str, damping: &Damping) -> Option<Finding> {
         }
         Damping::Modal(ratio) => {
             let slips = &[(100.0, "per cent"), (10.0, "a digit"), (0.01, "divided by 100 twice"), (0.1, "a digit")];
-            outside(&kinds::DAMPING_RATIO, name, *ratio, &RATIO, slips)
+            outside(&kinds::DAMPING_RATIO, name, *ratio, &RATIO, slips, 1.0)
         }
         Damping::StiffnessProportional(beta) | Damping::Rayleigh(_, beta) if *beta > CREEP => {
             let likely = slip(*beta, &(0.0..=CREEP), &[(1e3, "milliseconds")], 1.0);

@@ -29,4 +29,5 @@ pub mod validity;
 
 pub use flexarm_settings::finding::{Finding, Severity};
 pub use flexarm_settings::finding::{FindingKind, once_each, warnings};
+pub use kinds_of_entries::UNUSUAL;
 pub use of_use::Use;

@@ -2,11 +2,13 @@
 
 use std::ops::RangeInclusive;
 
+use super::{Finding, FindingKind};
+
 /// Factor by which a value is too large (below 1: too small), and the mistake that causes it.
 pub type Factor = (f64, &'static str);
 
 /// Degrees instead of radians.
-pub(crate) const DEGREES: f64 = 180.0 / std::f64::consts::PI;
+pub const DEGREES: f64 = 180.0 / std::f64::consts::PI;
 
 /// Factors for lengths in m.
 pub const LENGTH: &[Factor] = &[(1e3, "millimetres"), (1e2, "centimetres"), (1.0 / 0.0254, "inches")];
@@ -34,6 +36,21 @@ pub const INERTIA: &[Factor] = &[(1e4, "kg cm2"), (1e6, "kg mm2"), (1e9, "g mm2"
 pub fn slip(value: f64, plausible: &RangeInclusive<f64>, factors: &[Factor], power: f64) -> String {
     let mends = |(factor, _): &&Factor| plausible.contains(&(value / factor.powf(power)));
     factors.iter().find(mends).map(|(factor, words)| slip_text(*factor, words)).unwrap_or_default()
+}
+
+/// Returns the caveat of a value outside its range: its yardstick is the nearer end.
+///
+/// `power`: as for [`slip`].
+pub fn outside(
+    kind: &FindingKind,
+    name: impl Into<String>,
+    value: f64,
+    range: &RangeInclusive<f64>,
+    factors: &[Factor],
+    power: f64,
+) -> Option<Finding> {
+    let end = if value < *range.start() { *range.start() } else { *range.end() };
+    (!range.contains(&value)).then(|| kind.found(name, value, end).likely(slip(value, range, factors, power)))
 }
 
 /// Formats a mistake, such as "about 57 times: degrees?".

@@ -24,7 +24,8 @@ const SAMPLES_PER_PERIOD: f64 = 10.0;
 const PERIOD_ERROR: f64 = 0.05;
 /// Maximum share of joint drift in the TCP error.
 const DRIFT: f64 = 0.01;
-/// Maximum plausible settling band (m).
+/// Range of the settling band (m): what instruments see, and what robots are specified for.
+const NARROW_BAND: f64 = 1e-7;
 const WIDE_BAND: f64 = 0.01;
 /// Minimum number of steps in the longest move.
 const STEPS_PER_MOVE: f64 = 50.0;
@@ -133,6 +134,9 @@ pub(crate) fn drift(stepper: &str, part: f64) -> Option<Finding> {
 /// (m). For the default band it gives only a note.
 pub(crate) fn band(band_m: f64, peak_m: f64, usual_m: f64) -> Option<Finding> {
     let likely = || slip(band_m, &(1e-6..=WIDE_BAND), slip::LENGTH, 1.0);
+    if band_m < NARROW_BAND {
+        return Some(kinds::UNUSUAL.with_unit("m").found("the settling band", band_m, NARROW_BAND));
+    }
     if band_m > WIDE_BAND {
         return Some(kinds::WIDE_BAND.found("run", band_m, WIDE_BAND).likely(likely()));
     }

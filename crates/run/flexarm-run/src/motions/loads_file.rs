@@ -198,11 +198,14 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
     }
 }
 
-/// Caveats about angles that look like degrees: the phase of a sine, arguments of sin and cos in
-/// expressions.
+/// Caveats about angles that look like degrees (the phase of a sine, arguments of sin and cos in
+/// expressions), impulses and spindle speeds.
 fn doubts(e: &LoadEntry) -> Vec<Finding> {
     let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
-    caveat::loads::of_phase(e.phase).into_iter().chain(doubtful).collect()
+    let number = |value: &Option<Spanned<f64>>| value.as_ref().map(|value| *value.get_ref());
+    let [pulse, spindle] = [&e.duration, &e.spindle_rpm].map(number);
+    let laws = caveat::loads::of_impulse(pulse).into_iter().chain(caveat::loads::of_spindle(spindle));
+    caveat::loads::of_phase(e.phase).into_iter().chain(laws).chain(doubtful).collect()
 }
 
 /// The sines and cosines in all expressions of a load; see [`sines`].
@@ -222,7 +225,7 @@ fn sines(text: &str) -> Vec<(String, f64, f64)> {
             depth += i32::from(c == '(') - i32::from(c == ')');
             (depth <= 0).then_some(open + k)
         })?;
-        let argument: FlatEx<f64> = exmex::parse(text.get(open + 1..close)?).ok()?;
+        let argument: FlatEx<f64> = exmex::parse(&without_exponents(text.get(open + 1..close)?)).ok()?;
         if argument.var_names() != ["t"] {
             return None;
         }
@@ -527,7 +530,8 @@ fn part(
              every step: use kind = \"table\" for curves without a short formula"
         )));
     }
-    let parsed: FlatEx<f64> = exmex::parse(text).map_err(|error| fail(format!("expression {text:?}: {error}")))?;
+    let parsed: FlatEx<f64> =
+        exmex::parse(&without_exponents(text)).map_err(|error| fail(format!("expression {text:?}: {error}")))?;
     let unknown: Vec<&String> = parsed.var_names().iter().filter(|v| *v != "t").collect();
     if !unknown.is_empty() {
         return Err(fail(format!("expression {text:?} has the variables {unknown:?}; only t (s) is known")));
@@ -540,4 +544,41 @@ fn part(
         }
     }
     Ok((parsed, timed))
+}
+
+/// Returns an expression with its numbers such as 1e-3, which the parser does not read, as decimals.
+fn without_exponents(text: &str) -> String {
+    let (mut plain, mut rest) = (String::new(), text);
+    while let Some(first) = rest.chars().next() {
+        let length = |text: &str, of: &dyn Fn(char) -> bool| text.find(|c| !of(c)).unwrap_or(text.len());
+        let word = length(rest, &|c| c.is_alphabetic() || c == '_');
+        let name = if word > 0 { length(rest, &|c| c.is_alphanumeric() || c == '_') } else { 0 };
+        let digits = length(rest, &|c| c.is_ascii_digit() || c == '.');
+        let after = rest[digits..].strip_prefix(['e', 'E']).unwrap_or("");
+        let sign = usize::from(after.starts_with(['+', '-']));
+        let exponent = length(&after[sign..], &|c| c.is_ascii_digit());
+        let (taken, value) = match (name, digits, exponent) {
+            (name, ..) if name > 0 => (name, None),
+            (_, 0, _) => (first.len_utf8(), None),
+            (_, digits, 0) => (digits, None),
+            (_, digits, exponent) => {
+                let end = digits + 1 + sign + exponent;
+                (end, rest[..end].parse::<f64>().ok())
+            }
+        };
+        plain += &value.map_or_else(|| rest[..taken].to_owned(), |value| value.to_string());
+        rest = &rest[taken..];
+    }
+    plain
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_exponents;
+
+    #[test]
+    fn numbers_with_exponents_become_decimals_and_names_stay() {
+        let text = "1e3*sin(2.5E-1*t) + exp(-t) - 4e+2 + .5e1*e2e3 + 3*PI°";
+        assert_eq!(without_exponents(text), "1000*sin(0.25*t) + exp(-t) - 400 + 5*e2e3 + 3*PI°");
+    }
 }

@@ -10,7 +10,8 @@ use serde::Serialize;
 
 use crate::arm::Arm;
 use crate::arm::options::Modelling;
-use crate::caveat::{self, Finding, Use};
+use crate::caveat::slip::{self, outside};
+use crate::caveat::{self, Finding, UNUSUAL, Use};
 use crate::error::Error;
 use crate::poses::posed::{all_finite, pose_of};
 use crate::robot::balancer::{self, BalancerInfo};
@@ -218,6 +219,11 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     // Only the rigid robot is inspected, so the caveat about missing elasticity does not apply.
     let mut caveats = arm.caveats(Use::Held(&q, &[0.0; 6]));
     caveats.retain(|caveat| caveat.code != "nothing-yields");
+    caveats.extend(model.coordinates().iter().zip(&v).filter_map(|(c, v)| {
+        let kind = UNUSUAL.with_unit(if c.slides() { "m/s" } else { "rad/s" });
+        let name = format!("the speed of joint {:?} (by its limit)", c.joint);
+        outside(&kind, name, v.abs(), &(0.0..=c.limits.velocity), &slip::ANGLE[..1], 1.0)
+    }));
     Ok(Inspection {
         robot: robot.name.clone(),
         joints: joint_infos(&model),

@@ -16,7 +16,8 @@ use nalgebra::{Complex, DMatrix, Vector6};
 use serde::Serialize;
 
 use crate::arm::Arm;
-use crate::caveat::{self, Finding, kinds};
+use crate::caveat::slip::outside;
+use crate::caveat::{self, Finding, UNUSUAL, kinds};
 use crate::error::Error;
 use crate::poses::modes::{linear_error, modes_of, tool_map};
 use crate::poses::posed::Posed;
@@ -156,6 +157,9 @@ pub struct ResponseOutputs {
     pub overwrite: bool,
 }
 
+/// End of a band over the first and the last natural frequency, beyond which the band shows no mode.
+const BAND: [f64; 2] = [0.1, 50.0];
+
 /// Input or output channel: its name, its unit, its index and whether it is a joint.
 struct Channel {
     word: String,
@@ -217,6 +221,11 @@ fn response_at(posed: Posed, request: &ResponseRequest, outputs: Option<&Respons
     system.check().map_err(linear_error)?;
     let curves = transfer.curves(&inputs, &channels);
     let mut caveats = posed.caveats_of(&linear, &[0.0; 6]);
+    if let (Some(first), Some(last)) = (frequencies_hz.first(), frequencies_hz.last()) {
+        let (kind, usual) = (UNUSUAL.with_unit("Hz"), BAND[0] * first..=BAND[1] * last);
+        let factors = &[(1e-3, "kHz"), (std::f64::consts::TAU, "rad/s")];
+        caveats.extend(outside(&kind, "the end of the band of frequencies", to, &usual, factors, 1.0));
+    }
     let within = |k: &usize| damping_ratio[*k] < UNDAMPED && (from..=to).contains(&frequencies_hz[*k]);
     if let Some(k) = (0..modes.len()).find(within) {
         let hz = frequencies_hz[k];

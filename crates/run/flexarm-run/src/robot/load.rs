@@ -12,9 +12,9 @@ use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
 use super::{Robot, TCP_FRAME, finding_text};
 use crate::arm::Arm;
 use crate::arm::options::Modelling;
-use crate::caveat::{Finding, parts};
+use crate::caveat::Finding;
 use crate::error::Error;
-use crate::ranges::not_finite;
+use crate::ranges::{not_finite, unusual};
 use crate::robot::balancer_entry::add_balancers;
 use crate::robot::calibration_entry::{Calibration, calibrate};
 use crate::robot::controller_entry::controller_axes;
@@ -188,7 +188,7 @@ impl Robot {
             controller: Vec::new(),
             calibration,
             gauges: Vec::new(),
-            written: written_caveats(file),
+            written: written_caveats(file, source),
         };
         robot.add_entries(file, source, &LinkHome { folder, files }, &mut faults);
         match faults.len() {
@@ -357,14 +357,9 @@ fn argument_text(name: &str, value: &Spanned<toml::Value>, source: &Source) -> R
     }
 }
 
-/// Returns caveats about angles as written and about unused materials, which only the text of the
+/// Returns caveats about unusual numbers and about unused materials, which only the text of the
 /// file shows.
-fn written_caveats(file: &RobotFile) -> Vec<Finding> {
-    let rpy = file.tcp.as_ref().and_then(|tcp| parts::angles("rpy of the TCP", &tcp.get_ref().rpy));
-    let beams = file.flexible_link.iter().filter_map(|link| {
-        let roll = link.beam.as_ref()?.get_ref().roll;
-        parts::angles(&format!("roll of link {:?}", link.link.get_ref()), &[roll])
-    });
+fn written_caveats(file: &RobotFile, source: &Source) -> Vec<Finding> {
     let unused = file.flexible_link.iter().filter(|link| {
         link.beam.as_ref().is_some_and(|beam| beam.get_ref().section == "given" && beam.get_ref().material.is_some())
     });
@@ -373,5 +368,5 @@ fn written_caveats(file: &RobotFile) -> Vec<Finding> {
         let message = format!("the material of link {name:?} has no effect: its section is given by its stiffness");
         Finding::warning("no-effect", format!("link {name:?}"), message, "leave it out").as_note()
     });
-    rpy.into_iter().chain(beams).chain(unused).collect()
+    unusual(source.text()).into_iter().chain(unused).collect()
 }

@@ -42,21 +42,27 @@ impl BeforeRun<'_> {
         if let Some(first) = plant.modes.frequencies_hz().first() {
             let logged_hz = 1.0 / (steps_per_sample(options) as f64 * options.step_s);
             caveats.extend(validity::sampling(*first, logged_hz));
-            caveats.extend(validity::step(options.stepper, options.step_s, *first, plant.first_damping_ratio()));
         }
-        let moves = motion.trajectory.moves();
-        caveats.extend(validity::long_step(options.step_s, moves.iter().map(|m| m.end - m.start)));
+        caveats.extend(self.of_steps());
         if options.log_rate_hz * options.step_s > 1.0 + 1e-9 && options.log_rate_hz != RunOptions::default().log_rate_hz
         {
             caveats.push(kinds::LOG_RATE.found("run", options.log_rate_hz, 1.0 / options.step_s));
         }
-        caveats.extend(self.spook());
-        caveats.extend(self.ripple());
         if motion.trajectory.initial_speed() > 1e-6 {
             let message = "the motion starts at speed: the first ringing is an artefact of the sudden start";
             caveats.push(Finding::warning("starts-moving", "run", message, ""));
         }
         caveats
+    }
+
+    /// Returns the caveats about the step size and the stepper.
+    pub fn of_steps(&self) -> Vec<Finding> {
+        let Self { plant, motion, options, .. } = *self;
+        let first = plant.modes.frequencies_hz().first().copied();
+        let coarse = |first| validity::step(options.stepper, options.step_s, first, plant.first_damping_ratio());
+        let moves = motion.trajectory.moves();
+        let long = validity::long_step(options.step_s, moves.iter().map(|m| m.end - m.start));
+        first.and_then(coarse).into_iter().chain(long).chain(self.spook()).chain(self.ripple()).collect()
     }
 
     /// As `caveats`, for a study that keeps no samples: also checks the links at rest.

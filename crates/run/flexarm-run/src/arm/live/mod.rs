@@ -20,10 +20,10 @@ use flexarm_stepping::{
 };
 
 use crate::arm::Arm;
-use crate::arm::joint_values::joint_values;
 use crate::arm::options::RunOptions;
 use crate::error::Error;
 use crate::motions::payload::PayloadChange;
+use crate::poses::posed::pose_of;
 use crate::robot::PAYLOAD_LINK;
 
 pub use equations::{ElasticCoordinate, EquationCommand, Equations};
@@ -168,7 +168,7 @@ impl Arm {
     /// Returns the arm at rest at a pose, in static equilibrium under gravity, to be commanded
     /// every `period_s` (s).
     ///
-    /// * `at`: values of all actuated joints (rad or m), zero by default.
+    /// * `at`: values of all actuated joints (rad or m), [`Robot::start_pose`](crate::Robot::start_pose) by default.
     /// * `options`: stepper and step size; the period must be a whole number of steps.
     ///
     /// # Errors
@@ -201,8 +201,7 @@ impl Arm {
         if options.stepper.entry().steps == StepRule::ByErrorControl {
             return Err(runs_ahead(options.stepper.name()));
         }
-        let names: Vec<&str> = self.joints().collect();
-        let at = joint_values(at, &names)?;
+        let at = pose_of(self.robot(), at)?;
         let step_s = options.step_s;
         if !(step_s.is_finite() && step_s > 0.0) {
             return Err(Error::Value(format!(
@@ -364,6 +363,8 @@ fn started(
 impl Live {
     /// Resets the arm to rest at a pose at time 0, with or without its payload as it is.
     ///
+    /// * `at`: as of [`Arm::live`].
+    ///
     /// # Errors
     /// As [`Arm::live`].
     pub fn reset(&mut self, at: Option<&[f64]>) -> Result<(), Error> {
@@ -472,13 +473,8 @@ impl Live {
         Ok(())
     }
 
-    fn names(&self) -> Vec<&str> {
-        let model = &self.arm.model;
-        model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.as_str()).collect()
-    }
-
     fn checked(&self, at: Option<&[f64]>) -> Result<Vec<f64>, Error> {
-        joint_values(at, &self.names())
+        pose_of(self.arm.robot(), at)
     }
 
     /// Checks values; allocates only on failure.

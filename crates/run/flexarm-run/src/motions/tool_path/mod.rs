@@ -12,15 +12,15 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use flexarm_kinematics::{Frame, Model, Pose};
-use flexarm_path::program::{Note, Program};
+use flexarm_path::program::{Note, Program, Speed};
 use flexarm_path::{
     ControllerAxis, JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
 };
 use flexarm_trajectory::Trajectory;
 use nalgebra::DVector;
 
-use crate::caveat::Finding;
-use crate::caveat::slip::slip;
+use crate::caveat::slip::{self, Factor, outside};
+use crate::caveat::{Finding, UNUSUAL};
 use crate::error::Error;
 use crate::robot::controller_entry::RobotAxis;
 use crate::robot::tcp_frame;
@@ -207,7 +207,7 @@ impl ToolPath {
             warnings.push(format!("the arm has more joints than the path needs: {held} {what}"));
         }
         warnings.extend(tool_warning(program, arm));
-        warnings.extend(acceleration_warning(program));
+        warnings.extend(speed_warnings(program));
         let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_warning(of, slowed)));
         warnings.extend(first_of(slowed.collect()));
         let near = planned.moves.iter().filter_map(|of| {
@@ -273,23 +273,93 @@ fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
     ))
 }
 
-/// Range of the acceleration of a TCP along its path (m/s²); KUKA's default is 2.3.
-const PATH_ACCELERATION: RangeInclusive<f64> = 0.01..=300.0;
+/// Usual range of a speed of a move.
+struct UsualSpeed {
+    what: &'static str,
+    unit: &'static str,
+    of: fn(&Speed) -> Option<f64>,
+    range: RangeInclusive<f64>,
+    factors: &'static [Factor],
+}
 
-/// Warns about the first path acceleration that no robot has.
-fn acceleration_warning(program: &Program) -> Option<String> {
-    use flexarm_path::program::Item;
-    program.items.iter().find_map(|item| {
-        let Item::Move(of) = item else { return None };
-        let found = of.speed.linear_m_s2.filter(|found| !PATH_ACCELERATION.contains(found))?;
-        let (least, most) = (PATH_ACCELERATION.start(), PATH_ACCELERATION.end());
-        let likely = slip(found, &PATH_ACCELERATION, &[(1e3, "mm/s2"), (1e-3, "mm/s2 for m/s2")], 1.0);
-        let likely = if likely.is_empty() { likely } else { format!(" ({likely})") };
-        Some(format!(
-            "line {}: {}: the acceleration along the path is {found} m/s2, robots have {least} to {most}{likely}: check its unit",
-            of.line, of.statement
-        ))
-    })
+const PER_CENT: &[Factor] = &[(100.0, "per cent"), (0.01, "divided by 100 twice")];
+
+/// Usual speeds of robots: KUKA's default acceleration is 2.3 m/s², delta robots have 10 m/s and
+/// 150 m/s².
+const USUAL_SPEEDS: [UsualSpeed; 6] = [
+    UsualSpeed {
+        what: "the speed along the path",
+        unit: "m/s",
+        of: |speed| speed.linear_m_s,
+        range: 1e-5..=12.0,
+        factors: &[(60.0, "mm/min for mm/s"), (1e3, "mm/s")],
+    },
+    UsualSpeed {
+        what: "the acceleration along the path",
+        unit: "m/s2",
+        of: |speed| speed.linear_m_s2,
+        range: 0.01..=300.0,
+        factors: &[(1e3, "mm/s2"), (1e-3, "mm/s2 for m/s2")],
+    },
+    UsualSpeed {
+        what: "the jerk along the path",
+        unit: "m/s3",
+        of: |speed| speed.linear_m_s3,
+        range: 0.1..=1e5,
+        factors: &[(1e3, "mm/s3"), (1e-3, "mm/s3 for m/s3")],
+    },
+    UsualSpeed {
+        what: "the angular speed of the tool",
+        unit: "rad/s",
+        of: |speed| speed.angular_rad_s,
+        range: 1e-4..=60.0,
+        factors: slip::ANGLE,
+    },
+    UsualSpeed {
+        what: "the speed of the joints as a part of their limits",
+        unit: "",
+        of: |speed| speed.joint_fraction,
+        range: 1e-3..=1.0,
+        factors: PER_CENT,
+    },
+    UsualSpeed {
+        what: "the acceleration of the joints as a part of their limits",
+        unit: "",
+        of: |speed| speed.joint_acceleration_fraction,
+        range: 1e-3..=1.0,
+        factors: PER_CENT,
+    },
+];
+/// Usual distances of blends from their corners (m).
+const BLEND: RangeInclusive<f64> = 2e-5..=2.0;
+
+/// Warns about the first speed of each kind, and the first blend, that no robot has.
+fn speed_warnings(program: &Program) -> Vec<String> {
+    use flexarm_path::program::{Blend, Item};
+    let moves = || {
+        program.items.iter().filter_map(|item| match item {
+            Item::Move(of) => Some(of),
+            Item::Dwell { .. } => None,
+        })
+    };
+    let text = |line: usize, statement: &str, caveat: Finding| {
+        let likely = if caveat.likely.is_empty() { String::new() } else { format!(" ({})", caveat.likely) };
+        format!("line {line}: {statement}: {}{likely}: check its unit", caveat.message)
+    };
+    let speeds = USUAL_SPEEDS.iter().filter_map(|usual| {
+        moves().find_map(|of| {
+            let found = (usual.of)(&of.speed).filter(|found| found.is_finite())?;
+            let kind = UNUSUAL.with_unit(usual.unit);
+            let caveat = outside(&kind, usual.what, found, &usual.range, usual.factors, 1.0)?;
+            Some(text(of.line, &of.statement, caveat))
+        })
+    });
+    let blend = moves().find_map(|of| {
+        let Blend::Distance(found) = of.blend else { return None };
+        let caveat = outside(&UNUSUAL.with_unit("m"), "its blend", found, &BLEND, slip::LENGTH, 1.0)?;
+        Some(text(of.line, &of.statement, caveat))
+    });
+    speeds.chain(blend).collect()
 }
 
 fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
