@@ -468,12 +468,12 @@ impl FmuModel {
     }
 }
 
-/// Returns w, x, y, z of the orientation, w not negative.
-/// Joint positions at the start (rad or m).
-pub(crate) fn first_pose(arm: &Arm, settings: &PlantSettings) -> Vec<f64> {
+/// Returns the joint positions at the start (rad or m).
+pub(crate) fn first_pose(arm: &Arm, settings: &FmuSettings) -> Vec<f64> {
     settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.joints().count()])
 }
 
+/// Returns w, x, y, z of the orientation, w not negative.
 fn quaternion(pose: &Pose) -> [f64; 4] {
     let q = UnitQuaternion::from_rotation_matrix(&pose.rotation);
     let sign = if q.w < 0.0 { -1.0 } else { 1.0 };

@@ -213,7 +213,7 @@ fn slips_in_loads_and_paths_are_told() {
     let robot = project.join("robots/kr210/robot.toml");
     let told = |motion: Option<&Path>, loads: Option<&Path>| -> Vec<String> {
         let found = check_with_loads(&robot, motion, loads, &LoadOptions::default()).into_iter();
-        found.filter(|f| f.severity != "note" && f.code != "missing-mesh").map(|f| f.message).collect()
+        found.filter(|f| f.severity != flexarm::Severity::Note && f.code != "missing-mesh").map(|f| f.message).collect()
     };
     let impulse = "format = 1\n[[load]]\nkind = \"impulse\"\nstart = 1.0\nduration = 0.002\nforce = [0.0, 5.0, 0.0]\n";
     let milling = "format = 1\n[[load]]\nkind = \"milling\"\nteeth = 4\nspindle_rpm = 600.0\nforce = [9.0, 9.0, 0.0]\n";
