@@ -10,7 +10,8 @@
 //!
 //! # std::env::set_current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/../../.."))?;
 //! let robot = Robot::load("robots/kr210")?;
-//! let tool = CuttingTool { rpm: vec![6000.0, 9000.0], ..CuttingTool::load("robots/tools/endmill_20mm.toml")? };
+//! let mut tool = CuttingTool::load("robots/tools/endmill_20mm.toml")?;
+//! tool.rpm = vec![6000.0, 9000.0];
 //! let found = lobes(&robot, &tool, &CuttingPlace::At(None), &LobesRequest::default(), &|_, _| true)?;
 //! println!("stable up to {} m at {} rpm", found.best_depth_m, found.best_rpm);
 //! # assert!(found.best_depth_m >= found.stable_below_m.unwrap_or(0.0));
