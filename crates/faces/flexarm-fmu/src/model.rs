@@ -470,7 +470,7 @@ impl FmuModel {
 
 /// Returns w, x, y, z of the orientation, w not negative.
 /// Joint positions at the start (rad or m).
-pub(crate) fn first_pose(arm: &Arm, settings: &PlantSettings) -> Vec<f64> {
+pub(crate) fn first_pose(arm: &Arm, settings: &FmuSettings) -> Vec<f64> {
     settings.pose.clone().unwrap_or_else(|| vec![0.0; arm.joints().count()])
 }
 
