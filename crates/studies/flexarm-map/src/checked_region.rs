@@ -122,6 +122,7 @@ fn grid_region<'m>(
                        slow and may miss branches, and places near the workspace boundary";
         caveats.push(Finding::warning("searched-poses", "map", message, "map the arm over joint values"));
     }
+    caveats.extend(workspace.tool.caveat());
     let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
     let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
     let usual = if finder.is_closed() && directions < 10 { USUAL_PLACES } else { FEW_PLACES };
