@@ -161,7 +161,7 @@ fn a_recording_and_a_report_name_their_flags() {
     for name in ["a.xyz", "a.csv", "a.mcap", "figures"] {
         place.write(name, "time,x\n");
     }
-    let endings = "expected one of .mcap, .rrd, .csv, .parquet, .arrow: rename the file or give its format with";
+    let endings = "expected one of .mcap, .rrd, .csv, .parquet: rename the file or give its format with";
     refused(
         &place,
         &["convert"],
