@@ -292,9 +292,6 @@ pub fn map(
     let table = MapTable { columns: layout.columns.clone(), values: std::mem::take(&mut taken.rows) };
     let mut found = summed_up(robot, &arm, request, table, &taken, by, (all, grid.as_ref()), rotations.len())?;
     found.caveats.extend(caveats);
-    if let MapRegion::Workspace(workspace) = &request.region {
-        found.caveats.extend(workspace.tool.caveat());
-    }
     found.caveats.extend(one_place(&found));
     found.caveats.extend((done < all).then(|| unfinished(done, all)));
     if let Some(tool) = &request.tool {
