@@ -16,7 +16,7 @@ fn root() -> PathBuf {
 }
 
 fn load(file: &str) -> Robot {
-    Robot::load(&root().join(file)).expect("a sound robot")
+    Robot::load(root().join(file)).expect("a sound robot")
 }
 
 fn golden(file: &str) -> Value {

@@ -20,7 +20,7 @@ fn root() -> PathBuf {
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load(&root().join("robots").join(robot)).expect("a sound robot")
+    Robot::load(root().join("robots").join(robot)).expect("a sound robot")
 }
 
 /// The reference arm by file with another damping.

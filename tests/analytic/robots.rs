@@ -13,7 +13,7 @@ fn root() -> PathBuf {
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load(&root().join("robots").join(robot)).expect("a sound robot")
+    Robot::load(root().join("robots").join(robot)).expect("a sound robot")
 }
 
 /// Runs a robot and reads its table back: column name to values.

@@ -261,11 +261,11 @@ mod trajectory {
     #[test]
     fn toml_values() {
         let toml = with(SWING, "duration = 0.5", "duration = -0.5");
-        compare_motion("m.toml", toml, &["m.toml, line", "duration", "-0.5"]);
+        compare_motion("m.toml", toml, &["m.toml:", "duration", "-0.5"]);
         let toml = with(SWING, "to = [60.0]", "to = [60.0, 1.0]");
-        compare_motion("m.toml", toml, &["m.toml, line", "`to`", "2 entries", "expected 1"]);
+        compare_motion("m.toml", toml, &["m.toml:", "`to`", "2 entries", "expected 1"]);
         let toml = with(SWING, "to = [60.0]", "to = [nan]");
-        compare_motion("m.toml", toml, &["m.toml, line", "`to", "NaN"]);
+        compare_motion("m.toml", toml, &["m.toml:", "`to", "NaN"]);
         let toml = with(SWING, "\"quintic\"", "\"septic\"");
         compare_motion("m.toml", toml, &["m.toml:5:", "septic", "quintic"]);
         let toml = with(SWING, "format = 1", "format = 7");
@@ -394,7 +394,7 @@ mod robot_description {
         let again =
             "<joint name=\"again\" type=\"fixed\"><parent link=\"base\"/><child link=\"ball\"/></joint>\n</robot>";
         let text = with(URDF, "</robot>", again);
-        let first = format!("(arm.urdf:{}:", line_of(URDF, "\"weld\""));
+        let first = format!("(beam.urdf:{}:", line_of(URDF, "\"weld\""));
         urdf(&text, "again", &["link \"ball\"", "two joints", "\"weld\"", &first, "\"again\"", "remove"]);
     }
 
@@ -405,7 +405,7 @@ mod robot_description {
         let text = with(URDF, "\"revolute\"", "\"revolut\"");
         urdf(&text, "revolut", &["\"swing\"", "\"revolut\"", "did you mean \"revolute\"?"]);
         let again = with(URDF, "</robot>", "<link name=\"bar\"/><!-- again -->\n</robot>");
-        let first = format!("first at arm.urdf:{}:", line_of(URDF, "<link name=\"bar\">"));
+        let first = format!("first at beam.urdf:{}:", line_of(URDF, "<link name=\"bar\">"));
         urdf(&again, "again", &["link \"bar\"", "twice", &first]);
     }
 
@@ -947,7 +947,7 @@ fn a_column_that_comes_twice_is_refused_with_both_places() {
         place.refused(&arguments, &["l.csv", columns, name]);
     }
     place.write("m.csv", "time,swing,swing\n0,0,0\n1,0.1,0.2\n");
-    place.refused(&["compare", "robot.toml", "m.csv", "--no-files"], &["m.csv", "column 3", "as column 2", "swing"]);
+    place.refused(&["compare", "robot.toml", "m.csv", "--no-files"], &["m.csv:1:12", "as column 2", "swing"]);
     place.json(&["compare", "robot.toml", "swing.toml", "-o", "result"]);
     let table = place.text("result/run.csv");
     for name in ["time", "flexible_x_m", "swing_position_rad"] {

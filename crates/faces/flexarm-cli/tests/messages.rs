@@ -43,7 +43,7 @@ fn a_run_names_the_flags_that_mend_it() {
                 "spook works in maximal coordinates and does not support modal links (--links lumped would do): use \
              generalized-alpha",
             ),
-            (&["--magnify", "0"], "the factor of deflections (--magnify) must be positive, found 0 times"),
+            (&["--magnify", "0"], "--magnify: the factor of deflections must be positive, found 0 times"),
             (
                 &["--magnify", "1e9"],
                 "the factor of deflections (--magnify) is 1e9: expected one from 0.001 to 1000000, 1 shows them as they are",

@@ -13,7 +13,7 @@ use flexarm::{Keep, LinkModel, Modelling, Motion, Robot, RunOptions, RunRequest}
 fn main() -> Result<(), Box<dyn Error>> {
     let path = std::env::args().nth(1).ok_or("give the file to write")?;
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-    let robot = Robot::load(&root.join("robots/kr210"))?;
+    let robot = Robot::load(root.join("robots/kr210"))?;
     let model = robot.rigid_model()?;
     let motion = Motion::load_for(&root.join("trajectories/pick_and_place.toml"), &model)?;
     let choices = [

@@ -58,7 +58,7 @@ const AT: [f64; 6] = [0.0, -1.1, 1.2, 0.0, 0.4, 0.0];
 /// them.
 #[test]
 fn a_balancer_at_the_far_end_of_a_link_that_bends_holds_its_far_end() {
-    let robot = Robot::load(&project("robots/kr210/links.toml")).unwrap();
+    let robot = Robot::load(project("robots/kr210/links.toml")).unwrap();
     let helped = strut(&robot, [1.1, 0.0, 0.0]);
     let softness = |robot: &Robot, links: LinkModel| {
         let modelling = Modelling { links, drives: DriveModel::Rigid, ..Modelling::default() };

@@ -10,7 +10,7 @@ use flexarm_log::{Trace, TraceRow};
 
 fn variant(label: &str, robot: &str, trajectory: &str, modelling: &Modelling, options: RunOptions) -> Variant {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-    let robot = Robot::load(&root.join("robots").join(robot)).unwrap();
+    let robot = Robot::load(root.join("robots").join(robot)).unwrap();
     let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &robot.rigid_model().unwrap()).unwrap();
     Variant { label: label.into(), arm: robot.model(modelling).unwrap(), scenario: motion.into(), options }
 }

@@ -13,7 +13,7 @@ fn root() -> PathBuf {
 }
 
 fn load(robot: &str) -> Robot {
-    Robot::load(&root().join("robots").join(robot)).unwrap()
+    Robot::load(root().join("robots").join(robot)).unwrap()
 }
 
 fn motion(robot: &Robot, trajectory: &str) -> Motion {
@@ -99,7 +99,7 @@ fn the_first_line_of_the_shipped_arm_names_links_and_gearboxes() {
 #[test]
 fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() {
     let folder = root().join("robots/kr210");
-    let bare = Robot::load(&folder.join("kr210.urdf")).unwrap();
+    let bare = Robot::load(folder.join("kr210.urdf")).unwrap();
     let (summary, _) = run(&bare, "point_to_point.toml", &RunOptions::default());
     assert!(summary.bends.is_nothing() && summary.headline.starts_with("nothing is flexible"), "{}", summary.headline);
     for word in ["[[flexible_link]]", "[[drive]]", "gearbox", "robot file"] {

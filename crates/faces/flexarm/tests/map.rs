@@ -294,11 +294,11 @@ fn what_cannot_be_mapped_is_refused_with_its_cause() {
     assert!(error(&over(twice)).contains("is named twice"));
     assert!(error(&over(vec![joint("joint_1", [0.0, f64::NAN], 3)])).contains("has a range from 0 to NaN"));
     let many = ["joint_1", "joint_2", "joint_3"].map(|name| joint(name, [-1.0, -0.5], 1000)).to_vec();
-    assert!(error(&over(many)).contains("at most 1e6 are held in memory"));
+    assert!(error(&over(many)).contains("at most 5e6 are held in memory"));
     let workspace = |workspace| MapRequest { region: MapRegion::Workspace(workspace), ..MapRequest::default() };
     assert!(error(&workspace(grid([[1.0; 3], [0.0; 3]], 0.1))).contains("must have its lower corner first"));
     assert!(error(&workspace(grid([[0.0; 3], [1.0; 3]], 0.0))).contains("must be positive, found 0 m"));
-    assert!(error(&workspace(grid([[0.0; 3], [1.0; 3]], 1e-6))).contains("at most 1e6 are held in memory"));
+    assert!(error(&workspace(grid([[0.0; 3], [1.0; 3]], 1e-6))).contains("at most 5e6 are held in memory"));
     assert!(error(&workspace(grid([[9.0; 3], [9.5; 3]], 0.1))).contains("is within reach"));
     let tool = ToolDirections { axis: [0.0; 3], ..ToolDirections::default() };
     assert!(

@@ -18,7 +18,7 @@ impl Drop for Folder {
 fn recorded(name: &str, options: &RunOptions) -> (Folder, RunHeader) {
     let folder = Folder(std::env::temp_dir().join(format!("flexarm-recording-{}-{name}", std::process::id())));
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-    let robot = Robot::load(&root.join("robots/kr210")).unwrap();
+    let robot = Robot::load(root.join("robots/kr210")).unwrap();
     let motion =
         Motion::load_for(&root.join("trajectories/pick_and_place.toml"), &robot.rigid_model().unwrap()).unwrap();
     let outputs = Outputs { recordings: [RecordingFormat::Mcap].into(), ..Outputs::everything(&folder.0) };

@@ -24,7 +24,7 @@ fn run_as(
     outputs: Option<&Outputs>,
 ) -> Run {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-    let robot = Robot::load(&root.join("robots").join(robot)).unwrap();
+    let robot = Robot::load(root.join("robots").join(robot)).unwrap();
     let model = robot.rigid_model().unwrap();
     let motion = Motion::load_for(&root.join("trajectories").join(trajectory), &model).unwrap();
     let arm = robot.model(modelling).unwrap();
@@ -365,7 +365,7 @@ fn the_files_of_a_run_are_written_and_not_overwritten() {
         std::fs::write(other.0.join(name), "mine").unwrap();
         let outputs = Outputs { folder: other.0.clone(), ..outputs.clone() };
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..");
-        let robot = Robot::load(&root.join("robots/test/one_beam")).unwrap();
+        let robot = Robot::load(root.join("robots/test/one_beam")).unwrap();
         let motion =
             Motion::load_for(&root.join("trajectories/beam_swing.toml"), &robot.rigid_model().unwrap()).unwrap();
         let arm = robot.model(&Modelling::default()).unwrap();

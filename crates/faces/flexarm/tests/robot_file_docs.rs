@@ -142,7 +142,7 @@ const RAIL: &str = r#"<robot name="rail">
 fn every_example_of_a_motion_file_loads_and_goes_where_it_says() {
     let (page, place) = (read("docs/motions.md"), Place::new("motions"));
     std::fs::write(place.0.join("rail.urdf"), RAIL).unwrap();
-    let robot = Robot::load(&place.0.join("rail.urdf")).unwrap();
+    let robot = Robot::load(place.0.join("rail.urdf")).unwrap();
     let model = robot.rigid_model().unwrap();
     for language in ["toml", "csv"] {
         let examples = blocks(&page, language);

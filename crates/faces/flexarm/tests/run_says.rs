@@ -37,7 +37,7 @@ fn robots() -> PathBuf {
 }
 
 fn load(name: &str) -> (Robot, Motion) {
-    let robot = Robot::load(&robots().join(name)).unwrap();
+    let robot = Robot::load(robots().join(name)).unwrap();
     let motion = robot.default_trajectory.clone().unwrap();
     let motion = Motion::load_for(&motion, &robot.rigid_model().unwrap()).unwrap();
     (robot, motion)

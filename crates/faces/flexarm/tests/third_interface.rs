@@ -71,7 +71,7 @@ impl Place {
              distal = \"flange\"\nreduced = \"boom.flex\"\n{keys}"
         );
         std::fs::write(self.0.join("robot.toml"), file).unwrap();
-        Robot::load(&self.0.join("robot.toml"))
+        Robot::load(self.0.join("robot.toml"))
     }
 }
 

@@ -33,7 +33,7 @@ pub(crate) struct Checked {
 }
 
 fn located(span: Range<usize>, problem: Problem) -> Located {
-    Located { offset: Some(span.start), problem: problem }
+    Located { offset: Some(span.start), problem }
 }
 
 pub(crate) fn bad_value(span: Range<usize>, key: &str, found: impl Display, expected: &'static str) -> Located {

@@ -33,7 +33,7 @@
 //!
 //! let wrong = text.replace("link=\"rod\"", "link=\"rd\"");
 //! let findings = check_urdf_text(&wrong, "pendulum.urdf", &ReadOptions::default());
-//! assert_eq!(findings[0].location, "pendulum.urdf:11:4");
+//! assert_eq!(findings[0].location, "pendulum.urdf:11:3");
 //! assert_eq!(findings[0].help, "did you mean \"rod\"?");
 //! # Ok::<(), flexarm_urdf::UrdfError>(())
 //! ```

@@ -91,7 +91,7 @@ const FEED: f64 = 0.1;
 
 const TOO_FAST: &[Factor] = &[(1e-3, "kHz"), (TAU, "rad/s"), (60.0, "1/min")];
 const TOO_SOFT: &[Factor] = &[(1e-6, "N/um"), (1e-3, "N/mm")];
-const TOO_LIGHT: &[Factor] = &[(1e3, "grams"), (1e-3, "tonnes"), (1.0 / (TAU * TAU), "frequency in rad/s")];
+const TOO_LIGHT: &[Factor] = &[(1e3, "grams"), (1.0 / (TAU * TAU), "frequency in rad/s"), (1e-3, "tonnes")];
 const TOO_DAMPED: &[Factor] = &[(100.0, "per cent")];
 
 /// Returns the caveats about properties of a tool outside the usual ranges.

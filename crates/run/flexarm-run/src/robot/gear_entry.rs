@@ -202,11 +202,11 @@ impl GearLaws {
     /// Adds those of a drive whose joint has this coordinate and whose gearbox, if elastic, is this
     /// element.
     pub(crate) fn add(&mut self, drive: &Drive, coordinate: usize, element: Option<usize>) {
-        if let (Some(element), Some((_, gear))) = (element, &drive.gearbox) {
-            if !gear.transmission.is_empty() {
-                let harmonics = gear.transmission.clone();
-                self.transmission.push(TransmissionError { element, motor: coordinate, harmonics });
-            }
+        if let (Some(element), Some((_, gear))) = (element, &drive.gearbox)
+            && !gear.transmission.is_empty()
+        {
+            let harmonics = gear.transmission.clone();
+            self.transmission.push(TransmissionError { element, motor: coordinate, harmonics });
         }
         if drive.load_friction > 0.0 {
             let (coefficient, regularisation) = (drive.load_friction, drive.friction.regularisation);

@@ -133,7 +133,7 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
         let message = format!(
             "{duration_s} s in steps of {step_s:e} s make {:.1e} steps, at most {MAX_STEPS:.0e} are taken: raise {} \
              or cut the trajectory",
-            &duration_s / &step_s,
+            duration_s / step_s,
             Setting::Step
         );
         return Err(Error::Value(message));
