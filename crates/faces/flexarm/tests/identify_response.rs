@@ -128,7 +128,7 @@ fn stiffness_and_damping_come_back_from_noisy_responses_with_intervals_that_hold
     let robot = kr210();
     let test = Test::new(&robot);
     let place = Place::new("coverage");
-    let (mut inside, mut all, mut squares) = (0, 0, 0.0);
+    let (mut inside, mut all, mut squares, mut misfits) = (0, 0, 0.0, 0);
     let mut noise = Noise(17);
     for seed in 0..40 {
         let (z, x) = (Vector3::z(), Vector3::x());
@@ -140,7 +140,8 @@ fn stiffness_and_damping_come_back_from_noisy_responses_with_intervals_that_hold
         let asked = IdentifyRequest { output, overwrite: true, ..IdentifyRequest::default() };
         let found = identify_robot(&robot, &path, &asked).unwrap();
         assert!(found.parameters.iter().all(|p| p.identifiable), "{:?}", found.parameters);
-        assert!(found.misfit.is_none() && found.numbers == 200, "seed {seed}: {:?}, {}", found.misfit, found.numbers);
+        assert_eq!(found.numbers, 200);
+        misfits += usize::from(found.misfit.is_some());
         (inside, all) = (inside + told(&found), all + TRUTH.len());
         for p in &found.parameters {
             let factor = TRUTH.iter().find(|(name, _)| *name == p.name).unwrap().1;
@@ -158,6 +159,8 @@ fn stiffness_and_damping_come_back_from_noisy_responses_with_intervals_that_hold
         assert!(text.contains("damping = { modal = 0.0") && text.contains("link.link_2.damping ="), "{text}");
         Robot::load(place.0.join("out")).unwrap();
     }
+    // Scatter that chance gives once in 500 cases, in 40 fits of two responses each.
+    assert!(misfits <= 1, "{misfits} fits with a misfit");
     // For a standard normal distribution over 160: 1 within 0.17 in 99 of 100 cases.
     let spread = (squares / all as f64).sqrt();
     eprintln!("{inside} of {all} intervals hold the truth, errors over deviations {spread:.3}");

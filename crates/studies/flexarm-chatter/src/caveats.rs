@@ -72,8 +72,8 @@ const TEETH: RangeInclusive<f64> = 1.0..=100.0;
 /// Density of steel times the cube of the diameter, the scale of the mass of a cutter: a slender one
 /// has a modal mass of 0.3 of it, spindles have up to 1000 kg.
 const STEEL: f64 = 7850.0;
-const LEAST_MASS: f64 = 0.15;
-const MOST_MASS: f64 = 1e3;
+const MIN_MASS: f64 = 0.15;
+const MAX_MASS: f64 = 1e3;
 const ENGAGEMENT: RangeInclusive<f64> = 0.06..=TAU + 1e-9;
 const DEEPEST: RangeInclusive<f64> = 2e-3..=20.0;
 const DIAMETER: RangeInclusive<f64> = 1e-4..=0.5;
@@ -83,7 +83,7 @@ const DAMPING: RangeInclusive<f64> = 1e-4..=0.3;
 /// Radial and axial cutting coefficient over the tangential one.
 const COEFFICIENT: RangeInclusive<f64> = 0.0..=3.0;
 /// Helix and lead angles other than 0 (degrees); cutters for high feed have leads of 10.
-const CUTTING_ANGLE: RangeInclusive<f64> = 4.0..=90.0 + 1e-9;
+const CUTTING_ANGLE: RangeInclusive<f64> = 4.0..=90.5;
 /// Distance of the tip from the TCP (m).
 const TIP: RangeInclusive<f64> = 0.0..=5.0;
 /// Maximum feed per tooth over the diameter; high feeds have 0.05.
@@ -135,7 +135,7 @@ pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
     if cutter.helix != 0.0 {
         found.extend(outside(&angle, of("the helix"), cutter.helix.to_degrees(), &CUTTING_ANGLE, radians, 1.0));
     }
-    let masses = LEAST_MASS * STEEL * cutter.diameter.powi(3)..=MOST_MASS;
+    let masses = MIN_MASS * STEEL * cutter.diameter.powi(3)..=MAX_MASS;
     for (k, mode) in tool.modes.iter().enumerate() {
         let whose = format!("mode {} of {name}", k + 1);
         let stiffness = mode.mass * mode.omega * mode.omega;
