@@ -338,7 +338,8 @@ impl<'a> Job<'a> {
             let change = &best.change + inversion.commands(&y, self.step_s()).columns(0, N);
             let next = self.error(&change, beyond)?;
             let left = size(&within(&next));
-            let growth = if left[0].is_nan() { f64::NAN } else { (left[0] / least[0]).max(left[1] / least[1]) };
+            let [rms, largest] = [left[0] / least[0], left[1] / least[1]];
+            let growth = if rms.is_nan() { rms } else { rms.max(largest) };
             if growth.is_nan() || growth > 1.0 / SETTLED {
                 let cutoff_hz = inversion.cutoff_hz();
                 best.discarded.push(Discarded { iteration, cutoff_hz, growth });
@@ -350,10 +351,10 @@ impl<'a> Job<'a> {
                 whole = self.error(&best.change, beyond)?;
                 continue;
             }
-            if growth >= 1.0 {
+            if rms >= 1.0 {
                 break;
             }
-            let settled = growth > SETTLED || left[0] < ENOUGH * first[0];
+            let settled = rms.min(largest) > SETTLED || left[0] < ENOUGH * first[0];
             (least, best.motion, best.change) = (left, self.moved(&change)?, change);
             best.kept += 1;
             best.peaks.push(peak(&within(&next)));

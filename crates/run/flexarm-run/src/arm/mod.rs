@@ -106,10 +106,10 @@ impl Arm {
         self.plant_with(self.springs.clone(), motion)
     }
 
-    /// As [`Self::arm`], with other springs in the same places.
+    /// As [`Self::plant`], with other springs in the same places.
     ///
     /// # Errors
-    /// As [`Self::arm`].
+    /// As [`Self::plant`].
     pub fn plant_with(&self, springs: Vec<Spring>, motion: Arc<dyn PrescribedMotion>) -> Result<Plant, StepError> {
         self.completed(Plant::new(self.model.clone(), springs, motion)?)
     }

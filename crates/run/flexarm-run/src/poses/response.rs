@@ -39,7 +39,7 @@ const UNDAMPED: f64 = 1e-6;
 const AXES: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 const WRENCH: [&str; 6] = ["force-x", "force-y", "force-z", "torque-x", "torque-y", "torque-z"];
 
-/// Request for [`response`].
+/// Request for [`Arm::response`].
 #[derive(Clone, Debug)]
 pub struct ResponseRequest {
     /// Inputs: `force-x` ... `torque-z` (on the TCP, world axes), or names of joints.
@@ -175,7 +175,7 @@ impl Arm {
     /// `at`: values of all actuated joints (rad or m); [`crate::Robot::start_pose`] by default.
     ///
     /// # Errors
-    /// [`Error::Channel`] and [`Error::Value`] for invalid channel names and values, [`Error::Step`]
+    /// [`Error::Value`] for invalid channel names and values, [`Error::Step`]
     /// if there is no equilibrium.
     pub fn response(self: &Arc<Self>, at: Option<&[f64]>, request: &ResponseRequest) -> Result<Response, Error> {
         response_at(self.posed(at)?, request, None)

@@ -46,7 +46,7 @@ impl Variant {
 ///
 /// # Errors
 /// As [`Arm::simulate_with`](crate::Arm::simulate_with), with the label of the run that failed;
-/// [`Error::Study`] for labels that are not distinct.
+/// [`Error::Value`] for labels that are not distinct.
 pub fn compare_study(
     variants: &[Variant],
     outputs: Option<&Outputs>,
