@@ -92,6 +92,7 @@ const FEED: f64 = 0.1;
 const TOO_FAST: &[Factor] = &[(1e-3, "kHz"), (TAU, "rad/s"), (60.0, "1/min")];
 const TOO_SOFT: &[Factor] = &[(1e-6, "N/um"), (1e-3, "N/mm")];
 const TOO_LIGHT: &[Factor] = &[(1e3, "grams"), (1.0 / (TAU * TAU), "frequency in rad/s"), (1e-3, "tonnes")];
+const TOO_SHALLOW: &[Factor] = &[(1e-3, "metres, where the file has millimetres"), (1e3, "millimetres")];
 const TOO_DAMPED: &[Factor] = &[(100.0, "per cent")];
 
 /// Returns the caveats about properties of a tool outside the usual ranges.
@@ -109,7 +110,7 @@ pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
         outside(&TOOL_DIAMETER, &*name, cutter.diameter, &DIAMETER, slip::LENGTH, 1.0),
         outside(&TOOL_TEETH, &*name, cutter.teeth as f64, &TEETH, &[], 1.0),
         outside(&TOOL_ENGAGEMENT, &*name, arc, &ENGAGEMENT, &[], 1.0),
-        outside(&TOOL_DEEPEST, &*name, deepest_m / cutter.diameter, &DEEPEST, slip::LENGTH, 1.0),
+        outside(&TOOL_DEEPEST, &*name, deepest_m / cutter.diameter, &DEEPEST, TOO_SHALLOW, 1.0),
         outside(
             &share,
             of("the radial over the tangential coefficient"),
