@@ -29,7 +29,11 @@ const USUAL_WIDTH: usize = 80;
 
 /// Width of text for people (columns): that of the terminal, else that of the variable COLUMNS.
 pub(crate) fn columns() -> usize {
-    let terminal = terminal_size::terminal_size_of(std::io::stdout()).map(|(width, _)| usize::from(width.0));
+    let terminal = std::io::stdout()
+        .is_terminal()
+        .then(terminal_size::terminal_size)
+        .flatten()
+        .map(|(width, _)| usize::from(width.0));
     let named = || std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
     // Some terminals report a width of zero.
     terminal.filter(|width| *width > 0).or_else(named).unwrap_or(USUAL_WIDTH)
