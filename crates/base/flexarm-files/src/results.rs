@@ -138,7 +138,7 @@ impl Partial {
         let mut number = 0_u32;
         loop {
             // Short: the final name may be as long as the file system allows.
-            let path = end.with_file_name(format!("flexarm-{}-{number}.partial", std::process::id()));
+            let path = end.with_file_name(format!("flexarm-{number}.partial"));
             match OpenOptions::new().write(true).create_new(true).open(&path) {
                 Ok(file) => {
                     let new = Self { path, end };
