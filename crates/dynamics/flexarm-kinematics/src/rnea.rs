@@ -175,7 +175,7 @@ pub(crate) fn newton_euler<T: Real>(model: &Model, data: &mut Data<T>, q: &[T], 
             add_modal_forces(model, data, i, m, qdot, qddot);
         }
     }
-    // Inward pass, then the rotors, which turn with their joints alone.
+    // Inward pass; then the rotors, whose inertia acts on their own joints only.
     carry_inward(model, data);
     if let Some(qddot) = qddot {
         add_rotors(model, data, qddot);

@@ -86,7 +86,7 @@ pub fn static_targets(
     let mut targets = DVector::from_column_slice(q);
     let mut before = None;
     for iterations in 0..=MAX_ITERATIONS {
-        // Where the tool is at rest with the motors at the targets.
+        // Pose of the tool at rest with the motors at the targets.
         let held = plant.along(Arc::new(Held(targets.as_slice().to_vec())));
         let at = linearise(&held, tool, F_T_W, t)?;
         let off = displacement(&wanted, &at.X_WT);

@@ -165,7 +165,7 @@ fn a_live_arm_refuses_what_makes_no_sense_and_starts_again() {
     assert_eq!((live.time_s(), live.tcp_pose()), (0.0, begin));
 }
 
-/// Statics, live arms and their reset stand at the start of the robot's motion unless told otherwise.
+/// Default pose of statics, live arms and their reset: the start of the robot's motion.
 #[test]
 fn a_live_arm_begins_where_statics_stand() {
     let arm = robot("kr210").model(&Modelling::default()).unwrap();

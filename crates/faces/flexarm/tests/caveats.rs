@@ -258,9 +258,10 @@ fn slips_are_told_and_plausible_robots_are_not() {
     missed.iter().for_each(|missed| println!("missed: {missed}"));
     assert_eq!(false_alarms, [""; 0]);
     // Gear stiffnesses of the arm on the motor side are lower by the ratio squared, its speeds higher
-    // by the ratio, so that such friction and damping are plausible there. A tool of 10 m is within three times the reach of the large arm. The fifth gear of kr210 rotates a quarter
-    // as far as the others under their torques: in N m/deg it rotates 14.7 times as far, and a gear
-    // of kr500 with half the stiffness, which is plausible, 15 times.
+    // by the ratio, so that such friction and damping are plausible there. A tool of 10 m is within
+    // three times the reach of the large arm. The fifth gear of kr210 rotates a quarter as far as
+    // the others under their torques: in N m/deg it rotates 14.7 times as far, and a gear of kr500
+    // with half the stiffness, which is plausible, 15 times.
     let known = [
         ("abb_three_mass/", "gears in N mm/rad"),
         ("abb_three_mass/", "friction that begins at 4 rad/s"),

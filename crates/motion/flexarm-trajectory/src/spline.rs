@@ -82,7 +82,7 @@ impl Samples {
         let (curves, notes): (Vec<Curve>, Vec<Option<Warning>>) = (self.joints.iter())
             .map(|joint| {
                 let Judged { joint, note, smoothed } = joint.judged(&knots);
-                // What is left at the ends of holds by smoothing is no corner.
+                // Smoothing leaves small bends at the ends of holds, which are no corners.
                 let corners = if smoothed { Vec::new() } else { corners(&knots, &joint.position) };
                 (joint.curve(&knots, &corners), note)
             })
@@ -235,7 +235,7 @@ impl JointSamples {
 /// Samples as they are used.
 struct Judged<'a> {
     joint: Cow<'a, JointSamples>,
-    /// What is to be said about velocities and noise.
+    /// Warning about velocities or noise.
     note: Option<Warning>,
     /// Whether positions without corners were smoothed within their rounding.
     smoothed: bool,

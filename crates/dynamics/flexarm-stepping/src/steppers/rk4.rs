@@ -204,7 +204,7 @@ fn free_rates(plant: &Plant) -> Result<(f64, f64), StepError> {
         D[(i, i)] = plant.friction.get(*k).map_or(0.0, |f| f.viscous);
     }
     let singular = StepError::Singular { matrix: "mass matrix", t: 0.0 };
-    // Largest eigenvalues of L^-1 K L^-T (ω²) and of L^-1 D L^-T (decay), M = L Lᵀ.
+    // Maximum eigenvalues of L^-1 K L^-T (ω²) and of L^-1 D L^-T (decay), M = L Lᵀ.
     let L = M.cholesky().ok_or(singular.clone())?.l();
     let largest = |A: &DMatrix<f64>| {
         let half = L.solve_lower_triangular(A)?;

@@ -1,4 +1,4 @@
-//! What a run is asked for, and what it returns.
+//! Request of a run, and its result.
 
 use std::ops::ControlFlow;
 
