@@ -9,6 +9,21 @@ use crate::FileError;
 /// Maximum size of a file (bytes).
 const LARGEST: u64 = 256 << 20;
 
+/// Returns the path of the file that the entry `key` of a file in `folder` names.
+///
+/// # Errors
+/// Message for that entry: there is no such file.
+pub fn named_file(key: &str, file: &Path, folder: &Path) -> Result<PathBuf, String> {
+    let path = folder.join(file);
+    match path.is_file() {
+        true => Ok(path),
+        false => Err(format!(
+            "{key} = {file:?}: there is no file {}: correct the path, which is relative to the folder of this file",
+            path.display()
+        )),
+    }
+}
+
 /// Reads the text of a file.
 ///
 /// # Errors

@@ -94,14 +94,14 @@ mod missing {
     fn urdf() {
         let place = Place::new();
         std::fs::remove_file(place.path("beam.urdf")).unwrap();
-        compare_robot(&place, "robot.toml", &["robot.toml:3:", "beam.urdf", "no file"]);
+        compare_robot(&place, "robot.toml", &["robot.toml:3:", "beam.urdf", "no file", "correct the path"]);
     }
 
     #[test]
     fn reduced_link() {
         let place = Place::new();
         place.write("robot.toml", flex::robot());
-        compare_robot(&place, "robot.toml", &["robot.toml:11:", "bar.flex", "no file"]);
+        compare_robot(&place, "robot.toml", &["robot.toml:11:", "bar.flex", "no file", "correct the path"]);
     }
 
     #[test]
@@ -586,6 +586,12 @@ mod robot_toml {
         let place = Place::new();
         place.write("robot.toml", format!("{ROBOT}{again}"));
         compare_robot(&place, "robot.toml", &["robot.toml:", "\"bar\"", "twice"]);
+    }
+
+    #[test]
+    fn value_of_a_key_with_several_forms() {
+        let drive = "[[drive]]\njoint = \"swing\"\nkind = \"gearbox\"\ngearbox = { stiffness = \"soft\" }\n";
+        robot_file(&format!("{ROBOT}\n{drive}"), "\"soft\"", &["a list of 3 or 6 numbers", "found \"soft\""]);
     }
 
     #[test]

@@ -77,7 +77,7 @@ pub fn check_with_motion(
     findings.extend(own.map(|caveat| about(&file, caveat)));
     let motion = match (trajectory, robot.default_trajectory.as_deref()) {
         (None, Some(own)) if !own.is_file() => {
-            let message = format!("default_trajectory: there is no file {}", own.display());
+            let message = format!("default_trajectory: there is no file {}: correct the path", own.display());
             findings.push(error("missing-file", path.display().to_string(), &message));
             None
         }

@@ -7,7 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::estimation::{Answer, Form, MeasuredResponse, MeasuredShape, Probe, Reading, ReadingKind};
-use flexarm_files::NumberTable;
+use flexarm_files::{NumberTable, named_file};
 use flexarm_kinematics::{Data, Frame, Pose, forward_kinematics};
 use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
 use serde::Deserialize;
@@ -128,11 +128,8 @@ impl Reader<'_> {
         entry: &Spanned<ResponseEntry>,
     ) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
-        let path = self.folder.join(e.file.get_ref());
-        if !path.is_file() {
-            let message = format!("file = {:?}: there is no file {}", e.file.get_ref(), path.display());
-            return Err(self.error(e.file.span(), message));
-        }
+        let unnamed = |message| self.error(e.file.span(), message);
+        let path = named_file("file", e.file.get_ref(), self.folder).map_err(unnamed)?;
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let curves = match ending.as_str() {
             "uff" | "unv" | "ufb" | "bunv" => self.universal(&path, e)?,

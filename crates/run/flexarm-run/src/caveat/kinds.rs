@@ -468,7 +468,7 @@ pub(crate) const CREEP: FindingKind = FindingKind::warning(
 /// The gear is implausibly soft.
 pub(crate) const GEAR_SOFT: FindingKind = FindingKind::warning(
     "gear-stiffness",
-    "the gearbox of {where} turns by {value} rad under its effort limit, such drives by less than {yardstick}",
+    "the gearbox of {where} deflects by {value} rad under its effort limit, usual gearboxes by less than {yardstick}",
     "rad",
     "stiffness is in N m/rad on the joint's side; published gears turn by 1e-3 (rated) to 1e-2 rad (peak)",
 );
@@ -549,14 +549,14 @@ pub(crate) const STIFF_JOINT: FindingKind = FindingKind::warning(
 /// A gear deflects too much.
 pub(crate) const GEAR_ROTATION: FindingKind = FindingKind::warning(
     "gear-rotation",
-    "the gearbox of {where} gives by {value} rad, gears by less than {yardstick}",
+    "the gearbox of {where} deflects by {value} rad, usual gearboxes by less than {yardstick}",
     "rad",
     "check stiffness (N m/rad on the joint's side), masses and loads",
 );
 /// A bearing deflects too much.
 pub(crate) const BEARING: FindingKind = FindingKind::warning(
     "bearing",
-    "the bearing of {where} gives by {value} m, bearings by less than {yardstick}",
+    "the bearing of {where} deflects by {value} m, usual bearings by less than {yardstick}",
     "m",
     "translational stiffness is in N/m: bearings have 1e7 to 1e10",
 );

@@ -82,7 +82,7 @@ pub(crate) const FRICTION_SMOOTHING: FindingKind = FindingKind::warning(
 /// The springs of a mounting are as good as rigid.
 pub(crate) const MOUNTING_RIGID: FindingKind = FindingKind::warning(
     "mounting-stiff",
-    "{where} gives by {value} m under the weight of the robot, springs by more than {yardstick}",
+    "{where} deflects by {value} m under the weight of the robot, usual springs by more than {yardstick}",
     "m",
     "stiffness is in N/m and N m/rad; leave the mounting out if it is rigid",
 );

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use exmex::{Express, FlatEx};
-use flexarm_files::{Source, TextFileError as RobotFileError, read_text};
+use flexarm_files::{Source, TextFileError as RobotFileError, named_file, read_text};
 use flexarm_kinematics::{LinkInertia, Wrench};
 use flexarm_stepping::{LoadAxes, TimedWrench};
 use nalgebra::{Matrix3, Vector3};
@@ -358,11 +358,8 @@ impl Reading<'_> {
 
     fn table(&self, folder: &Path) -> Result<Curve, Error> {
         let file = self.entry.get_ref().file.as_ref().ok_or_else(|| self.lacks("file"))?;
-        let path = folder.join(file.get_ref());
-        if !path.is_file() {
-            let message = format!("file = {:?}: there is no file {}", file.get_ref(), path.display());
-            return Err(self.source.error(file.span(), message).into());
-        }
+        let unnamed = |message: String| self.source.error(file.span(), message);
+        let path = named_file("file", file.get_ref(), folder).map_err(unnamed)?;
         let (inner, bends) = table(&path)?;
         let (start, end) = (self.start, self.end);
         let value = move |t| if t >= start && t <= end { inner(t) } else { Wrench::zeros() };

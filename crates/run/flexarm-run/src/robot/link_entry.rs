@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use flexarm_fem::{BeamLink, Material, ReducedLink, Section, UnitSystem};
-use flexarm_files::{Source, TextFileError as RobotFileError};
+use flexarm_files::{Source, TextFileError as RobotFileError, named_file};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
 use flexarm_linkmaker::reduce::STRESS_FILE;
@@ -203,11 +203,8 @@ fn stored_link(
     home: &LinkHome<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<ReducedLink, Error> {
-    let path = home.folder.join(file.get_ref());
-    if !path.is_file() {
-        let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
-        return Err(source.error(file.span(), message).into());
-    }
+    let unnamed = |message: String| source.error(file.span(), message);
+    let path = named_file("reduced", file.get_ref(), home.folder).map_err(unnamed)?;
     let reduced = home.files.flex(&path)?;
     if reduced.name != *name {
         warnings.push(format!("link {name:?} takes the reduced link of {:?} ({})", reduced.name, path.display()));

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use flexarm_files::{Source, TextFileError as RobotFileError};
+use flexarm_files::{Source, TextFileError as RobotFileError, named_file};
 use flexarm_kinematics::{Joint, JointKind, Link, Mechanism, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, default_tcp, parse_urdf, read_urdf};
 use toml::Spanned;
@@ -80,9 +80,9 @@ impl<'a> RobotSource<'a> {
         let description = match self.description {
             Some(Description::Read(urdf)) => urdf.clone(),
             given => {
-                if given.is_none() && !urdf_path.is_file() {
-                    let message = format!("urdf = {:?}: there is no file {}", file.urdf.get_ref(), urdf_path.display());
-                    return Err(source.error(file.urdf.span(), message).into());
+                if given.is_none() {
+                    let unnamed = |message: String| source.error(file.urdf.span(), message);
+                    named_file("urdf", file.urdf.get_ref(), folder).map_err(unnamed)?;
                 }
                 let options = urdf_options(&file, &source, folder, self.options)?;
                 match given {

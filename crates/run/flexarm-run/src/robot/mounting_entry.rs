@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use flexarm_files::{Source, TextFileError as RobotFileError};
+use flexarm_files::{Source, TextFileError as RobotFileError, named_file};
 use flexarm_flexlink::{Mounting, base_link};
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Pose};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
@@ -236,11 +236,8 @@ fn base_in_link(
             Err(fail(xyz.span(), "the .flex file gives the position of the base (its interface B): leave xyz out"))
         }
         (Some(file), None) => {
-            let path = home.folder.join(file.get_ref());
-            if !path.is_file() {
-                let message = format!("reduced = {:?}: there is no file {}", file.get_ref(), path.display());
-                return Err(fail(file.span(), &message));
-            }
+            let unnamed = |message: String| fail(file.span(), &message);
+            let path = named_file("reduced", file.get_ref(), home.folder).map_err(unnamed)?;
             Ok(home.files.flex(&path)?.X_LB)
         }
         (None, Some(foot)) if foot.get_ref().iter().all(|x| *x == 0.0) => {

@@ -7,6 +7,9 @@ use toml::Spanned;
 
 use crate::ranges::{Ranges, not_finite, outside};
 
+/// Maximum length of a value that a message repeats (bytes).
+const MAX_FOUND: usize = 60;
+
 /// Reads the content of a file.
 ///
 /// * `ranges`: of its numbers.
@@ -28,7 +31,12 @@ pub fn parsed<T: DeserializeOwned>(
             }
             false => "",
         };
-        source.unread(error.span(), &format!("{}{hint}", error.message().trim()))
+        // A key with several forms says what it expects, but not what it got.
+        let message = error.message().trim();
+        let value = error.span().filter(|_| message.starts_with("expected ")).and_then(|span| text.get(span));
+        let found = value.filter(|value| value.len() <= MAX_FOUND && !value.contains('\n'));
+        let found = found.map(|value| format!(", found {value}")).unwrap_or_default();
+        source.unread(error.span(), &format!("{message}{found}{hint}"))
     })?;
     let version = format(&file);
     if *version.get_ref() != 1 {

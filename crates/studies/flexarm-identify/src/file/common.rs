@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 
 use crate::estimation::LoadCase;
-use flexarm_files::NumberTable;
+use flexarm_files::{NumberTable, named_file};
 use flexarm_kinematics::{SpatialInertia, Wrench};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
@@ -190,11 +190,8 @@ impl Reader<'_> {
 
     /// Reads a table that has the joints and the given columns.
     pub(super) fn table_with(&self, file: &Spanned<PathBuf>, columns: &[String]) -> Result<NumberTable, Error> {
-        let path = self.folder.join(file.get_ref());
-        if !path.is_file() {
-            let message = format!("file = {:?}: there is no file {}", file.get_ref(), path.display());
-            return Err(self.error(file.span(), message));
-        }
+        let path =
+            named_file("file", file.get_ref(), self.folder).map_err(|message| self.error(file.span(), message))?;
         let table = NumberTable::read(&path)?;
         let fail = |what: String| Error::File { path: path.clone(), what };
         if let Some((joint, _)) = self.cell.joints.iter().find(|(joint, _)| table.column(joint).is_none()) {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
 
-use flexarm_files::NumberTable;
+use flexarm_files::{NumberTable, named_file};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -122,11 +122,8 @@ impl RecordingTable<'_> {
 impl Reader<'_> {
     pub(super) fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
         let e = entry.get_ref();
-        let path = self.folder.join(e.file.get_ref());
-        if !path.is_file() {
-            let message = format!("file = {:?}: there is no file {}", e.file.get_ref(), path.display());
-            return Err(self.error(e.file.span(), message));
-        }
+        let unnamed = |message| self.error(e.file.span(), message);
+        let path = named_file("file", e.file.get_ref(), self.folder).map_err(unnamed)?;
         let table = RecordingTable { reader: self, table: NumberTable::read(&path)?, path };
         let time = table.column(e.time.get_ref(), e.time.span())?;
         let step_s = even_step(&time).ok_or_else(|| {
