@@ -128,8 +128,8 @@ impl Reader<'_> {
         entry: &Spanned<ResponseEntry>,
     ) -> Result<(), Error> {
         let (e, span) = (entry.get_ref(), entry.span());
-        let unnamed = |message| self.error(e.file.span(), message);
-        let path = named_file("file", e.file.get_ref(), self.folder).map_err(unnamed)?;
+        let located = |message| self.error(e.file.span(), message);
+        let path = named_file("file", e.file.get_ref(), self.folder).map_err(located)?;
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let curves = match ending.as_str() {
             "uff" | "unv" | "ufb" | "bunv" => self.universal(&path, e)?,

@@ -358,8 +358,8 @@ impl Reading<'_> {
 
     fn table(&self, folder: &Path) -> Result<Curve, Error> {
         let file = self.entry.get_ref().file.as_ref().ok_or_else(|| self.lacks("file"))?;
-        let unnamed = |message: String| self.source.error(file.span(), message);
-        let path = named_file("file", file.get_ref(), folder).map_err(unnamed)?;
+        let located = |message: String| self.source.error(file.span(), message);
+        let path = named_file("file", file.get_ref(), folder).map_err(located)?;
         let (inner, bends) = table(&path)?;
         let (start, end) = (self.start, self.end);
         let value = move |t| if t >= start && t <= end { inner(t) } else { Wrench::zeros() };

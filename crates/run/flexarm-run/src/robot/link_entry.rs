@@ -203,8 +203,8 @@ fn stored_link(
     home: &LinkHome<'_>,
     warnings: &mut Vec<String>,
 ) -> Result<ReducedLink, Error> {
-    let unnamed = |message: String| source.error(file.span(), message);
-    let path = named_file("reduced", file.get_ref(), home.folder).map_err(unnamed)?;
+    let located = |message: String| source.error(file.span(), message);
+    let path = named_file("reduced", file.get_ref(), home.folder).map_err(located)?;
     let reduced = home.files.flex(&path)?;
     if reduced.name != *name {
         warnings.push(format!("link {name:?} takes the reduced link of {:?} ({})", reduced.name, path.display()));

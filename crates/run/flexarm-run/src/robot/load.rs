@@ -81,8 +81,8 @@ impl<'a> RobotSource<'a> {
             Some(Description::Read(urdf)) => urdf.clone(),
             given => {
                 if given.is_none() {
-                    let unnamed = |message: String| source.error(file.urdf.span(), message);
-                    named_file("urdf", file.urdf.get_ref(), folder).map_err(unnamed)?;
+                    let located = |message: String| source.error(file.urdf.span(), message);
+                    named_file("urdf", file.urdf.get_ref(), folder).map_err(located)?;
                 }
                 let options = urdf_options(&file, &source, folder, self.options)?;
                 match given {

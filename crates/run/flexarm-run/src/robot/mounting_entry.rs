@@ -236,8 +236,8 @@ fn base_in_link(
             Err(fail(xyz.span(), "the .flex file gives the position of the base (its interface B): leave xyz out"))
         }
         (Some(file), None) => {
-            let unnamed = |message: String| fail(file.span(), &message);
-            let path = named_file("reduced", file.get_ref(), home.folder).map_err(unnamed)?;
+            let located = |message: String| fail(file.span(), &message);
+            let path = named_file("reduced", file.get_ref(), home.folder).map_err(located)?;
             Ok(home.files.flex(&path)?.X_LB)
         }
         (None, Some(foot)) if foot.get_ref().iter().all(|x| *x == 0.0) => {

@@ -122,8 +122,8 @@ impl RecordingTable<'_> {
 impl Reader<'_> {
     pub(super) fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
         let e = entry.get_ref();
-        let unnamed = |message| self.error(e.file.span(), message);
-        let path = named_file("file", e.file.get_ref(), self.folder).map_err(unnamed)?;
+        let located = |message| self.error(e.file.span(), message);
+        let path = named_file("file", e.file.get_ref(), self.folder).map_err(located)?;
         let table = RecordingTable { reader: self, table: NumberTable::read(&path)?, path };
         let time = table.column(e.time.get_ref(), e.time.span())?;
         let step_s = even_step(&time).ok_or_else(|| {
