@@ -150,6 +150,6 @@ fn every_command_with_a_motion_says_of_it_and_of_its_loads_what_check_says() {
     let found = map(&robot, &request, &mut |_, _| std::ops::ControlFlow::Continue(())).unwrap();
     assert!(told.is_subset(&codes(&found.caveats)), "{told:?} {:?}", found.warnings);
     let report = motion_report(&motion, Some(&robot), &MotionOptions::default(), &[], 100.0, false).unwrap();
-    assert!(report.warnings.iter().any(|text| text.contains("turns by")), "{:?}", report.warnings);
+    assert!(report.warnings.iter().any(|text| text.contains("deflects by")), "{:?}", report.warnings);
     assert!(report.warnings.iter().any(|text| text.contains("a damping of 0")), "{:?}", report.warnings);
 }
