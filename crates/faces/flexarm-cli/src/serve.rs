@@ -1,12 +1,13 @@
 //! `flexarm serve`: serves the web page, on which the program runs as WebAssembly, on this machine.
 
-use std::fs::File;
-use std::net::Ipv4Addr;
+use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Component, Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
-use tiny_http::{Header, Method, Request, Response, Server};
+use oxhttp::Server;
+use oxhttp::model::header::{ACCEPT_ENCODING, CACHE_CONTROL, CONTENT_ENCODING, CONTENT_TYPE, VARY};
+use oxhttp::model::{Body, Method, Request, Response, StatusCode};
 
 use crate::failure::Failure;
 use crate::shipped;
@@ -26,53 +27,50 @@ pub(crate) struct ServeArgs {
 /// Serves the page until the process is stopped. Only programs on this machine reach it.
 pub(crate) fn run(terminal: &Terminal, args: &ServeArgs) -> Result<ExitCode, Failure> {
     let folder = shipped::web_page()?;
-    let server = Server::http((Ipv4Addr::LOCALHOST, args.port)).map_err(|error| {
+    // Bound twice: port 0 gets its number, and a port in use is refused here.
+    let address = TcpListener::bind((Ipv4Addr::LOCALHOST, args.port)).and_then(|listener| listener.local_addr());
+    let refused = |error| {
         Failure::Usage(format!("port {} cannot be opened: {error}; without --port, a free one is taken", args.port))
-    })?;
-    let url = format!("http://{}/", server.server_addr());
+    };
+    let address = address.map_err(refused)?;
+    let served = folder.clone();
+    let server = Server::new(move |request| respond(request, &served)).bind(address).spawn().map_err(refused)?;
+    let url = format!("http://{address}/");
     let json = || to_json(&serde_json::json!({ "url": url, "folder": folder.display().to_string() }));
     answer(terminal, json, || format!("{url}: the page of {}; Ctrl-C ends it\n", folder.display()));
     if !args.no_open {
         open_in_browser(url.as_ref());
     }
-    for request in server.incoming_requests() {
-        let folder = folder.clone();
-        // A client that does not read its answer holds up its own thread only. Without a thread the
-        // request is dropped, which answers it with status 500.
-        let _ = std::thread::Builder::new().spawn(move || respond(request, &folder));
-    }
+    server.join().map_err(refused)?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Answers with a file of the folder, compressed if there is one beside it and the browser takes it,
 /// or with a status that says why not.
-fn respond(request: Request, folder: &Path) {
-    let open = |path: &Path| File::open(path).ok().filter(|file| file.metadata().is_ok_and(|found| found.is_file()));
-    let takes_gzip = request.headers().iter().any(|header| {
-        header.field.equiv("Accept-Encoding")
-            && header.value.as_str().split([',', ';']).any(|word| word.trim() == "gzip")
-    });
-    let file = requested(request.url()).and_then(|path| {
-        let path = folder.join(path);
-        let packed = path.with_added_extension("gz");
-        let packed = open(&packed).filter(|_| takes_gzip);
-        let is_packed = packed.is_some();
-        Some((packed.or_else(|| open(&path))?, path, is_packed))
-    });
-    let header = |field: &str, value: &str| Header::from_bytes(field, value).expect("the header is ASCII");
-    // The browser may be gone.
-    let _ = match file {
-        _ if !matches!(request.method(), Method::Get | Method::Head) => request.respond(Response::empty(405)),
-        Some((file, path, is_packed)) => {
-            let answer = Response::from_file(file)
-                .with_header(header("Content-Type", content_type(&path)))
-                .with_header(header("Vary", "Accept-Encoding"))
-                .with_header(header("Cache-Control", "no-cache"));
-            let packed = header("Content-Encoding", "gzip");
-            request.respond(if is_packed { answer.with_header(packed) } else { answer })
-        }
-        None => request.respond(Response::empty(404)),
+fn respond(request: &Request<Body>, folder: &Path) -> Response<Body> {
+    let status = |status: StatusCode| {
+        let mut response = Response::new(Body::empty());
+        *response.status_mut() = status;
+        response
     };
+    if request.method() != Method::GET {
+        return status(StatusCode::METHOD_NOT_ALLOWED);
+    }
+    let accepted = request.headers().get_all(ACCEPT_ENCODING).iter().filter_map(|value| value.to_str().ok());
+    let takes_gzip = accepted.flat_map(|value| value.split([',', ';'])).any(|word| word.trim() == "gzip");
+    let Some(path) = requested(request.uri().path()).map(|path| folder.join(path)) else {
+        return status(StatusCode::NOT_FOUND);
+    };
+    let packed = takes_gzip.then(|| std::fs::read(path.with_added_extension("gz")).ok()).flatten();
+    let response = Response::builder()
+        .header(CONTENT_TYPE, content_type(&path))
+        .header(VARY, "Accept-Encoding")
+        .header(CACHE_CONTROL, "no-cache");
+    let response = if packed.is_some() { response.header(CONTENT_ENCODING, "gzip") } else { response };
+    match packed.or_else(|| std::fs::read(&path).ok()) {
+        Some(bytes) => response.body(Body::from(bytes)).expect("the headers are ASCII"),
+        None => status(StatusCode::NOT_FOUND),
+    }
 }
 
 /// Returns the path of a file below the folder that an address names.
