@@ -41,7 +41,7 @@ async function open(hash = "", options = {}) {
   return page;
 }
 
-const settled = (page) => page.waitForFunction(() => !document.getElementById("result").classList.contains("busy") && /^(TCP error|The run did not)/.test(document.getElementById("headline").textContent), undefined, { timeout: 60_000 });
+const settled = (page) => page.waitForFunction(() => !document.getElementById("result").classList.contains("busy") && /TCP error|^The run did not/.test(document.getElementById("headline").textContent), undefined, { timeout: 60_000 });
 const headline = (page) => page.textContent("#headline");
 const picture = async (page, name) => PICTURES && (await page.screenshot({ path: path.join(PICTURES, `${name}.png`), fullPage: true }));
 const native_headline = (...args) => JSON.parse(native(["compare", ...args, "--no-files", "--json"]).stdout).headline;

@@ -53,7 +53,7 @@ fn respond(request: &Request<Body>, folder: &Path) -> Response<Body> {
         *response.status_mut() = status;
         response
     };
-    if request.method() != Method::GET {
+    if !matches!(*request.method(), Method::GET | Method::HEAD) {
         return status(StatusCode::METHOD_NOT_ALLOWED);
     }
     let accepted = request.headers().get_all(ACCEPT_ENCODING).iter().filter_map(|value| value.to_str().ok());
@@ -68,7 +68,10 @@ fn respond(request: &Request<Body>, folder: &Path) -> Response<Body> {
         .header(CACHE_CONTROL, "no-cache");
     let response = if packed.is_some() { response.header(CONTENT_ENCODING, "gzip") } else { response };
     match packed.or_else(|| std::fs::read(&path).ok()) {
-        Some(bytes) => response.body(Body::from(bytes)).expect("the headers are ASCII"),
+        // The server would send a body after HEAD too.
+        Some(bytes) => response
+            .body(if request.method() == Method::HEAD { Body::empty() } else { Body::from(bytes) })
+            .expect("the headers are ASCII"),
         None => status(StatusCode::NOT_FOUND),
     }
 }

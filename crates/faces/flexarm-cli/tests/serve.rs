@@ -65,6 +65,8 @@ fn the_page_is_served_on_the_loopback_interface_and_nothing_beside_it() {
         assert!(head.starts_with("HTTP/1.1 200") && head.contains(&format!("content-type: {kind}")), "{head}");
         assert_eq!(got, body);
     }
+    let (head, body) = server.ask("HEAD", "/");
+    assert!(head.starts_with("HTTP/1.1 200") && body.is_empty(), "{head}\n{body}");
     for missing in ["/../robot.toml", "/assets/../../robot.toml", "/assets", "/none"] {
         assert!(server.ask("GET", missing).0.starts_with("HTTP/1.1 404"), "{missing}");
     }
