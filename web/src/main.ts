@@ -294,7 +294,7 @@ function showShares(): void {
       label.textContent = name;
       bar.style.width = `${(100 * Math.abs(mm)) / largest}%`;
       if (mm < 0) bar.className = "less";
-      number.textContent = `${mm.toFixed(3)} mm`;
+      number.textContent = `${mm.toFixed(3).replace(/^-(0\.0+)$/, "$1")} mm`;
       return [label, bar, number];
     }),
   );
