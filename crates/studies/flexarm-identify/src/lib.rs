@@ -70,36 +70,14 @@ pub fn nominal(arm: &Arm) -> NominalArm {
 
 /// Returns the identifiable parameters of an arm, with the names that files and `--fit` use.
 pub fn parameters(arm: &Arm) -> Vec<Parameter> {
-    let special = |name: &str| {
-        parameters::is_direction(name)
-            || parameters::is_entry(name)
-            || parameters::is_tool(name)
-            || parameters::is_frame(name)
-    };
-    candidates_that(arm, |name| !special(name))
+    parameters_like(arm, "*")
 }
 
-/// Returns the six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`.
-/// Together they are the link's stiffness, which [`parameters()`] contains as a single factor.
-pub fn link_directions(arm: &Arm) -> Vec<Parameter> {
-    candidates_that(arm, parameters::is_direction)
-}
-
-/// Returns the 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]`
-/// with `i <= j`, before the link's factors are applied.
-pub fn link_entries(arm: &Arm) -> Vec<Parameter> {
-    candidates_that(arm, parameters::is_entry)
-}
-
-/// Returns the displacements of the joint frames, `joint.JOINT.x` to `.roll`, and the zeros of the
-/// joints, `joint.JOINT.zero` (m, rad).
-pub fn frame_parameters(arm: &Arm) -> Vec<Parameter> {
-    candidates_that(arm, parameters::is_frame)
-}
-
-fn candidates_that(arm: &Arm, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
-    let all = parameters::candidates(arm.robot(), arm).into_iter();
-    all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
+/// Returns the parameters that a pattern of `fit` selects, such as `joint.*`. `*` selects those of
+/// [`parameters()`]: without the parameters that a pattern must name.
+pub fn parameters_like(arm: &Arm, pattern: &str) -> Vec<Parameter> {
+    let all = parameters::candidates(arm.robot(), arm).into_iter().map(|c| c.parameter);
+    all.filter(|parameter| parameters::asks_for(pattern, &parameter.name)).collect()
 }
 
 /// Arguments of [`identify_robot`].

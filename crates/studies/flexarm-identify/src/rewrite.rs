@@ -109,6 +109,23 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
             let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
             put_stiffness(stiffness.ok_or(RewriteError::Missing("mounting.stiffness"))?, Some(*entry), found)
         }
+        ParameterLocation::Mass { link, flexible: true } => {
+            named(file, "flexible_link", "link", link)?.insert("mass", toml_edit::value(number));
+            Ok(())
+        }
+        ParameterLocation::Mass { link, flexible: false } => {
+            entry_of(file, "inertial", "link", link)?.insert("mass", toml_edit::value(number));
+            Ok(())
+        }
+        ParameterLocation::Com { link, axis, com } => {
+            let entry = entry_of(file, "inertial", "link", link)?;
+            if entry.get("com").is_none() {
+                entry.insert("com", toml_edit::value(com.iter().copied().collect::<Array>()));
+            }
+            let old = entry.get_mut("com").and_then(Item::as_array_mut).and_then(|com| com.get_mut(*axis));
+            replace(old.ok_or(RewriteError::Missing("inertial.com"))?, number);
+            Ok(())
+        }
         ParameterLocation::Payload => {
             let payload = file.get_mut("payload").and_then(Item::as_table_like_mut);
             payload.ok_or(RewriteError::Missing("payload"))?.insert("mass", toml_edit::value(number));
@@ -311,7 +328,7 @@ fn put_frames(
         }
     }
     for (Calibration { joint, frame, zero }, _) in corrections {
-        let entry = calibration_of(file, &joint)?;
+        let entry = entry_of(file, "calibration", "joint", &joint)?;
         let list = |values: [f64; 3]| values.map(exact).into_iter().collect::<Array>();
         let (roll, pitch, yaw) = frame.rotation.euler_angles();
         for (key, values) in [("xyz", frame.translation.vector.into()), ("rpy", [roll, pitch, yaw])] {
@@ -332,19 +349,23 @@ fn put_frames(
     Ok(())
 }
 
-/// Returns the `[[calibration]]` of a joint, a new one if the file has none.
-fn calibration_of<'a>(file: &'a mut DocumentMut, joint: &str) -> Result<&'a mut dyn TableLike, RewriteError> {
-    if named(file, "calibration", "joint", joint).is_err() {
+/// Returns the entry with a given name in an array of tables, a new one if the file has none.
+fn entry_of<'a>(
+    file: &'a mut DocumentMut,
+    list: &'static str,
+    key: &'static str,
+    name: &str,
+) -> Result<&'a mut dyn TableLike, RewriteError> {
+    if named(file, list, key, name).is_err() {
         let mut table = Table::new();
-        table.insert("joint", toml_edit::value(joint));
-        let list = file.entry("calibration").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
-        match list {
+        table.insert(key, toml_edit::value(name));
+        match file.entry(list).or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new())) {
             Item::ArrayOfTables(tables) => tables.push(table),
             Item::Value(Value::Array(values)) => values.push(table.into_inline_table()),
-            _ => return Err(RewriteError::Form { what: "calibration".into(), expected: "a list of tables" }),
+            _ => return Err(RewriteError::Form { what: list.into(), expected: "a list of tables" }),
         }
     }
-    named(file, "calibration", "joint", joint)
+    named(file, list, key, name)
 }
 
 /// Sets a number of the guide of a drive.

@@ -110,7 +110,11 @@ impl Place {
     }
 
     fn identify(&self, robot: &Robot, std: &str) -> Result<Identification, Error> {
-        let mut text = "format = 1\nfit = [\"drive.*\", \"joint.*.zero\"]\n[instrument.camera]\n".to_owned();
+        self.identify_all(robot, r#"["drive.*", "joint.*.zero"]"#, std)
+    }
+
+    fn identify_all(&self, robot: &Robot, fit: &str, std: &str) -> Result<Identification, Error> {
+        let mut text = format!("format = 1\nfit = {fit}\n[instrument.camera]\n");
         for (name, link, xyz) in HANDS {
             let near = xyz.map(|x| x + 0.004);
             let _ = writeln!(text, "[target.{name}]\nlink = \"{link}\"\nxyz = {near:?}\nunknown = true");
@@ -201,6 +205,87 @@ fn two_hands_in_one_fit_tell_the_springs_and_the_written_file_is_the_model_of_th
     }
     eprintln!("{inside} of {told} intervals hold the truth");
     assert!(told >= 48 && inside * 100 >= told * 88, "{inside} of {told}");
+}
+
+/// Truth: links whose masses differ from the file's by 6 to 15 % and whose centres of mass are
+/// elsewhere; the springs are known.
+#[test]
+fn masses_and_centres_of_mass_are_found_where_they_bend_the_arm_and_stay_where_they_do_not() {
+    let place = Place::new("masses");
+    // Relative error of the mass, and centre of mass (m).
+    let true_of: [(&str, f64, [f64; 3]); 5] = [
+        ("pitch", 1.06, [0.17, 0.02, 0.01]),
+        ("l1", 0.9, [0.215, 0.015, -0.01]),
+        ("l2", 1.15, [0.14, -0.01, 0.005]),
+        ("r1", 0.93, [0.18, 0.02, 0.0]),
+        ("r2", 1.12, [0.165, 0.01, 0.0]),
+    ];
+    let mass_of = |name: &str| LINKS[JOINTS.iter().position(|joint| *joint == name).unwrap()].2;
+    let inertials: String = true_of
+        .iter()
+        .map(|(name, by, com)| {
+            format!("[[inertial]]\nlink = \"{name}\"\nmass = {:?}\ncom = {com:?}\n", by * mass_of(name))
+        })
+        .collect();
+    let springs = [2.2e4, 4.0e3, 1.5e3, 6.0e3, 1.5e3, 3.0e4, 5.0e4].map(|k| 0.1 * k);
+    let truth = place.robot("truth.toml", springs, &inertials);
+    let guess = place.robot("guess.toml", springs, "");
+    let (mut inside, mut told) = (0, 0);
+    for seed in 0..6 {
+        let mut draw = Draw(170 + seed);
+        let rows = place.measure(&truth, &mut draw, &|_, _| {});
+        let found = place.identify_all(&guess, r#"["link.*.mass", "link.*.com.*"]"#, "").unwrap();
+        assert_eq!(found.parameters.len(), 4 * JOINTS.len());
+        let written = rms(&Robot::load(place.0.join("out")).unwrap(), &found, &rows);
+        let apart = (written / found.residual.after - 1.0).abs();
+        eprintln!("residual {:.4e} m, the written file {apart:.1e} of it off", found.residual.after);
+        assert!(apart < 1e-6, "{written:e} {:e}", found.residual.after);
+        assert!((0.8..1.1).contains(&(found.residual.after / NOISE)), "{:?}", found.residual);
+        for p in &found.parameters {
+            let (link, key) = p.name["link.".len()..].split_once('.').unwrap();
+            let Some((_, by, com)) = true_of.iter().find(|(name, ..)| *name == link) else {
+                // The first axis is vertical: its link bends nothing.
+                assert!(!p.identifiable && (p.value - p.initial).abs() < 1e-6, "{p:?}");
+                continue;
+            };
+            let truth = match key {
+                "mass" => by * mass_of(link),
+                _ => com["xyz".find(&key[4..]).unwrap()],
+            };
+            if p.identifiable {
+                (told, inside) = (told + 1, inside + usize::from(p.interval[0] < truth && truth < p.interval[1]));
+            }
+            assert!(key != "mass" || (p.value / p.initial - 1.0).abs() < 0.4, "{p:?}");
+        }
+    }
+    eprintln!("{inside} of {told} intervals hold the truth");
+    assert!(told >= 40 && inside * 100 >= told * 88, "{inside} of {told}");
+}
+
+/// Truth: the robot file of a shipped robot with two other masses, one of them of a beam.
+#[test]
+fn masses_of_beams_and_of_rigid_links_are_written_to_the_robot_file_that_gives_them() {
+    let place = Place::new("beams");
+    let beam = |mass: &str| {
+        format!(
+            "[[flexible_link]]\nlink = \"l1\"\n{mass}damping = {{ modal = 0.02 }}\nsegments = 3\n\
+             beam = {{ section = \"tube\", outer_diameter = 0.05, wall = 0.001, material = \"steel\" }}\n"
+        )
+    };
+    let springs = [2.2e3, 4.0e2, 1.5e2, 6.0e2, 1.5e2, 3.0e3, 5.0e3];
+    let other = beam("mass = 5.4\n") + "[[inertial]]\nlink = \"l2\"\nmass = 2.7\n";
+    let truth = place.robot("truth.toml", springs, &other);
+    let guess = place.robot("guess.toml", springs, &beam(""));
+    let rows = place.measure(&truth, &mut Draw(31), &|_, _| {});
+    let found = place.identify_all(&guess, r#"["link.l*.mass"]"#, "").unwrap();
+    let text = std::fs::read_to_string(place.0.join("out/robot.toml")).unwrap();
+    let written = rms(&Robot::load(place.0.join("out")).unwrap(), &found, &rows);
+    let apart = (written / found.residual.after - 1.0).abs();
+    for (p, truth) in found.parameters.iter().zip([5.4, 2.7]) {
+        eprintln!("{} = {:.4} +- {:.4} kg, truth {truth}", p.name, p.value, p.std);
+        assert!(p.identifiable && p.interval[0] < truth && truth < p.interval[1], "{p:?}");
+    }
+    assert!(apart < 1e-6 && text.contains("[[inertial]]") && text.matches("mass = ").count() == 2, "{apart} {text}");
 }
 
 #[test]

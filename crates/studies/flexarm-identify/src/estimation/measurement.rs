@@ -12,7 +12,9 @@ use flexarm_stepping::{OperatingPoint, StepError};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3, Vector6};
 
 use crate::estimation::least_squares::Residuals;
-use crate::estimation::parameter::{Effect, NominalArm, Parameter, carried_along, displacement, tool_shift};
+use crate::estimation::parameter::{
+    Effect, NominalArm, Parameter, carried_along, displacement, link_change, tool_shift,
+};
 use crate::estimation::reading::{
     Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
 };
@@ -149,9 +151,11 @@ impl<'a> Workspaces<'a> {
     }
 
     /// Returns the parameters for an arm that carries a mass at its tool: moving the tool also
-    /// moves that mass. Twists of joint frames are in the axes after all displacements.
+    /// moves that mass. Twists of joint frames are in the axes after all displacements; masses and
+    /// centres of mass of links are linearised at their present values.
     fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
-        if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. })) {
+        let depends = |p: &Parameter| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. } | Effect::Link { .. });
+        if !self.parameters.iter().any(depends) {
             return Cow::Borrowed(self.parameters);
         }
         let (body, X_BF) = (self.nominal.tool.body, self.nominal.tool.X_BF);
@@ -159,7 +163,13 @@ impl<'a> Workspaces<'a> {
         let mut all = self.parameters.to_vec();
         for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
             let per_kg = carried_along(&I, &X_BF.translation.vector, &v, &w);
-            all[k].effect = Effect::Mass { body, per_kg };
+            all[k].effect = Effect::Mass(vec![(body, per_kg)]);
+        }
+        for (own, old) in all.iter_mut().zip(self.parameters) {
+            if let Effect::Link { parts, .. } = &old.effect {
+                let (factor, shift) = link_change(self.parameters, &self.x, parts);
+                own.effect = Effect::Mass(old.effect.inertia_rates(factor, &shift));
+            }
         }
         for k in 0..all.len() {
             let (before, after) = all.split_at_mut(k);

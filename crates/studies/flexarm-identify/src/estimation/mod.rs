@@ -30,7 +30,7 @@ pub use identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEs
 pub use identify::{IdentifyOptions, identify};
 pub use least_squares::{Loss, Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, solve};
 pub use measurement::{MeasuredArm, NoAnswer};
-pub use parameter::{Effect, NominalArm, Parameter, SpringPart};
+pub use parameter::{Effect, LinkPart, NominalArm, Parameter, SpringPart};
 pub use plan::{Candidate, Plan, PlanOptions, plan};
 pub use reading::{
     Component, Form, Instrument, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,

@@ -10,13 +10,11 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, Twist, Wrench, forward_kinematics, rotation_vector};
+use flexarm_kinematics::{Data, Frame, SpatialInertia, Twist, Wrench, forward_kinematics, rotation_vector};
 use flexarm_stepping::{Guide, GuideTerm, OperatingPoint, Plant, SpringCurve, StepError, Tangents};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector3, Vector6};
 
-use crate::estimation::parameter::{
-    Effect, NominalArm, Parameter, SpringPart, displacement, entry_slope, scaled, slope_of,
-};
+use crate::estimation::parameter::{Effect, NominalArm, Parameter, SpringPart, displacement, entry_slope, slope_of};
 
 /// Step of the central differences over displacements of joint frames (m, rad): the error is of the
 /// order of its square.
@@ -40,7 +38,6 @@ pub(crate) fn slopes_at_rest(
     parameters: &[Parameter],
     frame: &Frame,
 ) -> (DMatrix<f64>, Matrix6xX<f64>) {
-    let n = at.deflections().len();
     let (mut slopes, rigid) = frame_slopes(at, parameters, frame);
     for (k, parameter) in parameters.iter().enumerate() {
         match &parameter.effect {
@@ -70,14 +67,10 @@ pub(crate) fn slopes_at_rest(
                 }
             }
             Effect::Frame { .. } => {}
-            Effect::Mass { body, per_kg } => {
-                // Forces are linear in a mass: a difference of any size is exact.
-                let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
-                let plant = at.plant().clone();
-                let heavier = carrying(&plant, *body, per_kg);
-                at.forces_of(&heavier, &mut with);
-                at.forces_of(&plant, &mut without);
-                slopes.set_column(k, &(with - without));
+            effect @ (Effect::Mass(_) | Effect::Link { .. }) => {
+                for (body, rate) in effect.inertia_rates(1.0, &Vector3::zeros()) {
+                    at.add_weight(body, &rate, slopes.column_mut(k).as_mut_slice());
+                }
             }
         }
     }
@@ -107,13 +100,6 @@ fn stiffness_forces(at: &OperatingPoint, place: &SpringPart) -> Vec<(usize, f64)
 /// Returns the change of a guide's number per unit of its search coordinate.
 fn per_unit(guide: &Guide, term: GuideTerm) -> f64 {
     if term.is_positive() { guide.number(term) } else { 1.0 }
-}
-
-/// Returns the arm with one kilogram added.
-fn carrying(plant: &Plant, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> Plant {
-    let mut inertia = plant.model.bodies()[body].inertia;
-    inertia += scaled(per_kg, 1.0);
-    plant.with_inertia(body, inertia)
 }
 
 /// Computes the derivatives of the tool pose as twists (world axes, at the tool's origin; m, rad)
@@ -402,8 +388,15 @@ pub(crate) fn explicit(
             let [ahead, behind] = frames_beside(plant, *body, twist).map(|plant| Tangents::at(&plant, tool, F_T_W, q));
             ((ahead.K - behind.K) / (2.0 * FRAME_STEP), (ahead.M - behind.M) / (2.0 * FRAME_STEP))
         }
-        Effect::Mass { body, per_kg } => {
-            let heavier = Tangents::at(&carrying(plant, *body, per_kg), tool, F_T_W, q);
+        Effect::Mass(_) | Effect::Link { .. } => {
+            // Linear in the inertias: a difference of any size is exact.
+            let add = |plant: Plant, (body, rate): (usize, SpatialInertia)| {
+                let mut inertia = plant.model.bodies()[body].inertia;
+                inertia += rate;
+                plant.with_inertia(body, inertia)
+            };
+            let heavier = effect.inertia_rates(1.0, &Vector3::zeros()).into_iter().fold(plant.clone(), add);
+            let heavier = Tangents::at(&heavier, tool, F_T_W, q);
             (heavier.K - &here.K, heavier.M - &here.M)
         }
     }
