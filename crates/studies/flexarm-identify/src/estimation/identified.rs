@@ -62,6 +62,9 @@ pub struct Identified {
     pub correlation: DMatrix<f64>,
     /// Combinations that the readings do not determine: parameter and weight, largest weight first.
     pub untold: Vec<Vec<(usize, f64)>>,
+    /// Parameters that these combinations connect; alone: a parameter that the readings do not
+    /// determine.
+    pub together: Vec<Vec<usize>>,
     /// Search coordinates of the parameters, then the unknowns of the measurements.
     pub unknowns: DVector<f64>,
     /// Solution of the least-squares problem.

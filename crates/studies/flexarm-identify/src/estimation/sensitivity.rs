@@ -10,7 +10,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, SpatialInertia, Twist, Wrench, forward_kinematics, rotation_vector};
+use flexarm_kinematics::{Frame, SpatialInertia, Twist, Wrench, rotation_vector};
 use flexarm_stepping::{Guide, GuideTerm, OperatingPoint, Plant, SpringCurve, StepError, Tangents};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector3, Vector6};
 
@@ -148,8 +148,8 @@ fn frame_slopes(at: &mut OperatingPoint, parameters: &[Parameter], frame: &Frame
     (forces, twists)
 }
 
-/// Computes the derivatives of [`frame_slopes`] for arms with closed loops, balancers or
-/// load-dependent stiffness by central differences.
+/// Computes the derivatives of [`frame_slopes`] for arms with balancers or load-dependent stiffness by
+/// central differences.
 fn frame_differences(
     at: &mut OperatingPoint,
     parameters: &[Parameter],
@@ -159,7 +159,6 @@ fn frame_differences(
 ) {
     let n = at.deflections().len();
     let mut plant = at.plant().clone();
-    let mut data = Data::new(&plant.model);
     let mut moved = [DVector::zeros(n), DVector::zeros(n)];
     for &k in some {
         let Effect::Frame { body, twist, .. } = &parameters[k].effect else { continue };
@@ -167,8 +166,7 @@ fn frame_differences(
         let [behind, ahead] = [-FRAME_STEP, FRAME_STEP].map(|step| {
             Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ * displacement(&(twist * step)));
             at.forces_of(&plant, &mut moved[usize::from(step > 0.0)]);
-            forward_kinematics(&plant.model, &mut data, at.coordinates());
-            data.X_WF(frame)
+            at.pose_of(frame)
         });
         Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ);
         forces.set_column(k, &((&moved[1] - &moved[0]) / (2.0 * FRAME_STEP)));
