@@ -45,7 +45,8 @@ fn richardson(h: f64, f: impl Fn(f64) -> Vec<f64>) -> Vec<f64> {
 #[test]
 fn the_error_of_kr210_depends_on_its_numbers_as_differences_of_runs_say() {
     let (_, arm, motion) = shipped("kr210", "point_to_point");
-    let all: Vec<Parameter> = parameters(&arm).into_iter().chain(parameters_like(&arm, "link.*.stiffness_factors[*]")).collect();
+    let all: Vec<Parameter> =
+        parameters(&arm).into_iter().chain(parameters_like(&arm, "link.*.stiffness_factors[*]")).collect();
     let of = |name: &str| all.iter().find(|p| p.name == name).unwrap_or_else(|| panic!("{name}")).clone();
     let names = [
         "drive.joint_2.gearbox.stiffness",

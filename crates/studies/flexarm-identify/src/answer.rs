@@ -12,7 +12,7 @@ use serde::Serialize;
 
 use super::doubts::{caveats, combinations};
 use super::encoders::EncoderFigures;
-use super::error::IdentifyFileError;
+use super::error::refused;
 use super::file::MeasurementInput;
 use flexarm_run::Error;
 use flexarm_run::Finding;
@@ -466,9 +466,7 @@ fn shapes(
     unknowns: &DVector<f64>,
 ) -> Result<Vec<ShapeFigures>, Error> {
     let arm = MeasuredArm { nominal, parameters: fitted, measurements };
-    let of = |unknowns: &DVector<f64>| {
-        arm.assurances(unknowns).map_err(|error| Error::from(IdentifyFileError::Fit(error.to_string())))
-    };
+    let of = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(|error| refused(error.to_string()));
     let (before, after) = (of(&DVector::zeros(unknowns.len()))?, of(unknowns)?);
     let figures = before.iter().zip(after).map(|((_, _, before), (number, mode, assurance))| ShapeFigures {
         reading: measurements.readings[number].name.clone(),

@@ -44,7 +44,7 @@ use flexarm_files::{check_apart, check_free, write_all};
 use self::answer::answer;
 use self::choose::{check_tool, chosen};
 use self::doubts::{empty_caveat, encoder_caveats, frame_caveat, gear_caveat, load_caveats};
-use self::error::{of_names, of_slip};
+use self::error::{of_names, of_slip, refused};
 use self::file::{Cell, MeasurementInput};
 use self::parameters::ParameterLocation;
 use self::units::{check_modes, check_units};
@@ -121,9 +121,10 @@ pub fn identify_robot_watched(
     let encoders = encoders::encoder_figures(&arm, &input, &chosen)?;
     input.measurements.readings.extend(encoders.iter().filter_map(EncoderFigures::reading));
     if input.measurements.readings.is_empty() {
-        return Err(
-            IdentifyFileError::NoGear { joints: encoders.iter().map(|gear| gear.joint.clone()).collect() }.into()
-        );
+        let joints: Vec<&String> = encoders.iter().map(|gear| &gear.joint).collect();
+        return Err(refused(format!(
+            "the recordings of {joints:?} do not determine a stiffness: deflection and torque are not correlated"
+        )));
     }
     let targets = match &request.output {
         Some(folder) => Some(Targets::in_folder(folder, robot, measurements, request.overwrite)?),
@@ -196,7 +197,7 @@ impl Targets {
         // Relative paths from the new file need its folder to exist.
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
         let new = rewrite::rewritten(&text, &identified, robot.tcp(), &robot.calibration, home, folder)
-            .map_err(|error| Error::File { path: robot.path.clone(), what: error.to_string() })?;
+            .map_err(|what| Error::File { path: robot.path.clone(), what })?;
         (answer.file, answer.page) = (Some(self.robot.display().to_string()), Some(self.page.display().to_string()));
         let page = page::html(answer);
         write_all(&[(self.robot, new), (self.page, page)])?;
@@ -212,6 +213,6 @@ pub mod internals {
     pub use crate::estimation::parameter::displacement;
     pub use crate::estimation::placement::rigid_fit;
     pub use crate::parameters::ParameterLocation;
-    pub use crate::rewrite::{RewriteError, rewritten};
-    pub use crate::uff::{UffError, UffFunction, read_functions};
+    pub use crate::rewrite::rewritten;
+    pub use crate::uff::{UffFunction, read_functions};
 }

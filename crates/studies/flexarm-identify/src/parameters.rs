@@ -285,38 +285,30 @@ fn frame_parameters(arm: &Arm) -> Vec<Candidate> {
     found
 }
 
-/// Reason why parameters cannot have one value.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum TieError {
-    #[error("no parameter that is fitted matches it")]
-    NoMatch,
-    #[error("{own} = {own_value}, {other} = {other_value}: give them one value in the robot file")]
-    Values { own: String, own_value: f64, other: String, other_value: f64 },
-    #[error("{0} and {1} cannot have one value: expected stiffnesses, or one number of guides")]
-    Laws(String, String),
-}
-
 impl Candidate {
     /// Adds another parameter that has the same value.
     ///
     /// # Errors
-    /// [`TieError`] if the two have different laws or initial values.
-    pub(crate) fn tie(&mut self, other: &Self) -> Result<(), TieError> {
+    /// A message if the two have different laws or initial values.
+    pub(crate) fn tie(&mut self, other: &Self) -> Result<(), String> {
         let (own, others) = (&mut self.parameter, &other.parameter);
         if (own.initial - others.initial).abs() > 1e-9 * own.initial.abs() {
-            return Err(TieError::Values {
-                own: own.name.clone(),
-                own_value: own.initial,
-                other: others.name.clone(),
-                other_value: others.initial,
-            });
+            let Parameter { name, initial, .. } = others;
+            let text =
+                format!("{} = {}, {name} = {initial}: give them one value in the robot file", own.name, own.initial);
+            return Err(text);
         }
         match (&mut own.effect, &others.effect) {
             (Effect::Stiffness(places), Effect::Stiffness(more)) => places.extend(more),
             (Effect::Guide { springs, term, .. }, Effect::Guide { springs: more, term: same, .. }) if term == same => {
                 springs.extend(more);
             }
-            _ => return Err(TieError::Laws(own.name.clone(), others.name.clone())),
+            _ => {
+                let (own, other) = (&own.name, &others.name);
+                return Err(format!(
+                    "{own} and {other} cannot have one value: expected stiffnesses, or one number of guides"
+                ));
+            }
         }
         self.tied.push(other.written.clone());
         Ok(())

@@ -10,8 +10,8 @@ use flexarm_identify::{
 use flexarm_kinematics::{Pose, Wrench, rotation_vector};
 use flexarm_run::caveat::Use;
 use flexarm_run::{Error, Modelling, Robot};
-use flexarm_testkit::Draw;
 use flexarm_stepping::OperatingPoint;
+use flexarm_testkit::Draw;
 use nalgebra::{Rotation3, Translation3, Vector3, Vector6};
 
 /// Joint values and the markers of two targets; `None` where a coordinate was not seen.

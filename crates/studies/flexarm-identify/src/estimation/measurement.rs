@@ -7,7 +7,7 @@
 
 use std::borrow::Cow;
 
-use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench, rotation_vector};
+use flexarm_kinematics::{ElasticAngles, Frame, Pose, SpatialInertia, Wrench, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3, Vector6};
 
@@ -481,13 +481,7 @@ fn tool_twists<'a>(
 /// Returns the left Jacobian of a rotation vector: angular velocity (fixed axes) per rate of the
 /// vector.
 fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
-    let angle = v.norm();
-    let K = v.cross_matrix();
-    let (a, b) = match angle < 1e-4 {
-        true => (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0),
-        false => ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / angle.powi(3)),
-    };
-    nalgebra::Matrix3::identity() + K * a + K * K * b
+    ElasticAngles::RotationVector.pose(v).1.transpose()
 }
 
 impl MeasuredArm<'_> {

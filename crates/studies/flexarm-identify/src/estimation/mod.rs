@@ -10,7 +10,6 @@
 //! Not here: files, units, robots by name (the crate root).
 
 pub(crate) mod bounded;
-mod coupled_gears;
 mod encoders;
 mod identified;
 pub(crate) mod identify;
@@ -24,8 +23,7 @@ mod response;
 mod sensitivity;
 mod slips;
 
-pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
-pub use encoders::{GearEstimate, GearRun, gear_stiffness};
+pub use encoders::{GearEstimate, GearOutput, gear_stiffness};
 pub use identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
 pub use identify::{IdentifyOptions, identify};
 pub use least_squares::{Loss, Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, solve};

@@ -337,7 +337,8 @@ impl NominalArm {
                     }
                 }
                 Effect::Link { parts, .. } => {
-                    let same = |other: &Parameter| matches!(&other.effect, Effect::Link { parts: own, .. } if own == parts);
+                    let same =
+                        |other: &Parameter| matches!(&other.effect, Effect::Link { parts: own, .. } if own == parts);
                     if parameters[..k].iter().any(same) {
                         continue;
                     }

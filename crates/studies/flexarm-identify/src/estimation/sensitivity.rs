@@ -11,8 +11,8 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, SpatialInertia, Twist, Wrench, rotation_vector};
-use flexarm_stepping::{Guide, GuideTerm, OperatingPoint, Plant, SpringCurve, StepError, Tangents};
-use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector3, Vector6};
+use flexarm_stepping::{Guide, GuideTerm, OperatingPoint, Plant, SpringCurve, StepError, Tangents, modes_of};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector3, Vector6};
 
 use crate::estimation::parameter::{Effect, NominalArm, Parameter, SpringPart, displacement, entry_slope, slope_of};
 
@@ -246,28 +246,8 @@ pub fn frequency_slopes(
 
 /// Squares of the natural frequencies, ascending, and mode shapes with `φᵀ M φ = 1`.
 pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
-    let singular = |matrix| StepError::Singular { matrix, t: 0.0 };
-    let K = (&at.K + at.K.transpose()) * 0.5;
-    let L = K.cholesky().ok_or_else(|| singular("static stiffness (with the effect of weight)"))?.unpack();
-    let lower = |B: &DMatrix<f64>| L.solve_lower_triangular(B).ok_or_else(|| singular("stiffness factor"));
-    let A = lower(&lower(&at.M)?.transpose())?;
-    let eigen = SymmetricEigen::new((&A + A.transpose()) * 0.5);
-    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
-    order.sort_by(|i, j| eigen.eigenvalues[*j].total_cmp(&eigen.eigenvalues[*i]));
-    let mut shapes = DMatrix::zeros(order.len(), order.len());
-    let mut omega2 = Vec::with_capacity(order.len());
-    for (column, k) in order.into_iter().enumerate() {
-        let value = eigen.eigenvalues[k];
-        if value.is_nan() || value <= 0.0 {
-            return Err(singular("mass matrix of the elastic coordinates"));
-        }
-        // K φ = ω² M φ with φ = L^-T y, and φᵀ M φ = yᵀ A y = value.
-        let y = eigen.eigenvectors.column(k).into_owned();
-        let phi = L.tr_solve_lower_triangular(&y).ok_or_else(|| singular("stiffness factor"))? / value.sqrt();
-        shapes.set_column(column, &phi);
-        omega2.push(1.0 / value);
-    }
-    Ok((omega2, shapes))
+    let modes = modes_of(&((&at.K + at.K.transpose()) * 0.5), &at.M, 0.0)?;
+    Ok((modes.omega.iter().map(|omega| omega * omega).collect(), modes.shapes))
 }
 
 /// Computes the derivative of matrices that depend on the coordinates, as the elastic coordinates
