@@ -1,6 +1,6 @@
 //! Caveats about an identification.
 
-use crate::estimation::{Identified, MeasuredArm, NominalArm, ParameterEstimate, ReadingKind};
+use crate::estimation::{Identified, MeasuredArm, NominalArm, FittedParameter, ReadingKind};
 use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
@@ -58,7 +58,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
             format!("the residuals are {factor:.2} times as large as the standard deviations of the readings: {cause}");
         caveats.push(Finding::warning("misfit", "measurements", text, remedy));
     }
-    let unsure = |p: &&ParameterEstimate| !p.identifiable && !p.rigid;
+    let unsure = |p: &&FittedParameter| !p.identifiable && !p.rigid;
     let unsure = found.parameters.iter().filter(unsure).count();
     if unsure > 0 {
         let text = format!("these readings do not determine {unsure} of {} parameters alone", found.parameters.len());

@@ -56,7 +56,7 @@ use flexarm_run::caveat::Use;
 use flexarm_run::caveat::warnings;
 
 pub use self::answer::{
-    Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
+    Compared, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
     ShapeFigures, Suspicious, Weight,
 };
 pub use self::encoders::EncoderFigures;
@@ -189,7 +189,7 @@ impl Targets {
     ) -> Result<(), Error> {
         let identified = found.parameters.iter().zip(chosen);
         let places = |c: &parameters::Candidate| std::iter::once(c.written.clone()).chain(c.tied.clone());
-        let identified: Vec<(ParameterEstimate, ParameterLocation)> =
+        let identified: Vec<(FittedParameter, ParameterLocation)> =
             identified.flat_map(|(p, c)| places(c).map(|place| (p.clone(), place))).collect();
         let text = flexarm_files::read_text(&robot.path)?;
         let home = robot.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));

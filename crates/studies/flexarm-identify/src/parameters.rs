@@ -1,26 +1,5 @@
 //! Identifiable parameters of a robot file: their names, their effect on the arm, and their places
-//! in the file.
-//!
-//! | name | meaning |
-//! | --- | --- |
-//! | `drive.JOINT.gearbox.stiffness` | single stiffness of a gearbox (N m/rad; N/m if it slides) |
-//! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six stiffnesses, from 0 |
-//! | `drive.JOINT.gearbox.seat[k]` | stiffness of the housing across the axis, before the joint |
-//! | `link.LINK.stiffness_factor` | factor on the whole stiffness of a flexible link |
-//! | `link.LINK.stiffness_factors[k]` | factor on one of six directions of a lumped link, from 0 |
-//! | `link.LINK.stiffness[i][j]` | entry of a two-part link's symmetric 6x6 (N/m, N, N m/rad) |
-//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | shift and rotation of the tool, own axes (m, rad) |
-//! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
-//! | `drive.JOINT.gearbox.damping` | damping of a gearbox, if the file has it (N m s/rad, N s/m) |
-//! | `drive.JOINT.gearbox.damping[k]` | one of three or six dampers, from 0 |
-//! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
-//! | `payload.mass` | mass of the payload (kg), its centre of mass fixed |
-//! | `link.LINK.mass` | mass of a link (kg), its centre of mass and radii of gyration fixed |
-//! | `link.LINK.com.x`, `.y`, `.z` | centre of mass of a rigid link, link axes (m) |
-//! | `drive.JOINT.gearbox.guide.AXIS.compliance[k]` | tilt of a telescopic joint about x, y or z |
-//! | `drive.JOINT.gearbox.guide.AXIS.play.gap` | its clearance (m); also `centre`, `width` (N m) |
-//! | `joint.JOINT.x`, `.y`, `.z`, `.yaw`, `.pitch`, `.roll` | shift and rotation of a joint frame |
-//! | `joint.JOINT.zero` | zero of a joint (rad; m if it slides) |
+//! in the file. `docs/identify.md` lists the names.
 
 use crate::estimation::{Effect, LinkPart, NominalArm, Parameter, SpringPart};
 use flexarm_flexlink::{GearStiffness, SEAT};

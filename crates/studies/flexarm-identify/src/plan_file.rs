@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::estimation::{
-    Candidate, Component, LoadCase, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind, Row, plan,
+    Component, LoadCase, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind, Row, plan,
 };
 use flexarm_files::{NumberTable, check_apart, check_free, write_all};
 use flexarm_kinematics::Wrench;
@@ -229,8 +229,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let request = &request;
     let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
     let pairs = allowed(&efforts, poses.len(), &request.setups(), if chosen_forces { 0 } else { request.count });
-    let candidates: Vec<Candidate> =
-        pairs.iter().map(|(pose, setup)| Candidate(reading(&poses[*pose], setup))).collect();
+    let candidates: Vec<Reading> = pairs.iter().map(|(pose, setup)| reading(&poses[*pose], setup)).collect();
     let purpose: Vec<Reading> = match &request.work {
         Some(path) => {
             let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
@@ -239,7 +238,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         None => Vec::new(),
     };
     let nominal = nominal(&arm);
-    let options = PlanOptions { count: request.count, purpose, repeat: false };
+    let options = PlanOptions { count: request.count, purpose };
     let [best, first] = plans(&nominal, &fitted, &candidates, &options)?;
     let mut caveats = arm.caveats(Use::Any);
     let over = best.chosen.iter().filter_map(|k| efforts.excess(pairs[*k].0, pairs[*k].1.force, pairs[*k].1.at));
@@ -290,10 +289,10 @@ fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Finding> {
 fn plans(
     nominal: &NominalArm,
     fitted: &[Parameter],
-    candidates: &[Candidate],
+    candidates: &[Reading],
     options: &PlanOptions,
 ) -> Result<[Plan; 2], Error> {
-    let plan_of = |candidates: &[Candidate]| {
+    let plan_of = |candidates: &[Reading]| {
         plan(nominal, fitted, candidates, options).map_err(|error| refused(error.to_string()))
     };
     let best = plan_of(candidates)?;
@@ -368,13 +367,13 @@ fn poses_of(path: &Path, joints: &[String]) -> Result<Vec<Vec<f64>>, Error> {
 
 fn planned(
     nominal: &NominalArm,
-    candidates: &[Candidate],
+    candidates: &[Reading],
     best: &Plan,
     pairs: &[(usize, Setup)],
 ) -> Result<Vec<PlannedReading>, Error> {
     let one = |number: &usize| {
         let setup = pairs[*number].1;
-        let q = candidates[*number].0.q.clone();
+        let q = candidates[*number].q.clone();
         let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
         let measurements = crate::estimation::Measurements { readings: vec![reading], ..Default::default() };
         let arm = crate::estimation::MeasuredArm { nominal, parameters: &[], measurements: &measurements };

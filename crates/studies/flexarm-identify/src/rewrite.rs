@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::estimation::ParameterEstimate;
+use crate::estimation::FittedParameter;
 use crate::estimation::parameter::displacement;
 use flexarm_kinematics::Pose;
 use flexarm_run::Calibration;
@@ -25,7 +25,7 @@ use super::parameters::ParameterLocation;
 #[doc(hidden)]
 pub fn rewritten(
     text: &str,
-    found: &[(ParameterEstimate, ParameterLocation)],
+    found: &[(FittedParameter, ParameterLocation)],
     tool: (&str, &Pose),
     calibrations: &[Calibration],
     home: &Path,
@@ -46,7 +46,7 @@ pub fn rewritten(
 
 /// Writes one value to its place; the pose of the tool and the joint frames are left to [`put_tool`]
 /// and [`put_frames`].
-fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLocation) -> Option<()> {
+fn put(file: &mut DocumentMut, found: &FittedParameter, written: &ParameterLocation) -> Option<()> {
     let number = exact(found.value);
     match written {
         ParameterLocation::Gearbox { joint, entry } => {
@@ -120,10 +120,10 @@ fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLoc
 }
 
 /// Returns the header comment that lists the identified values.
-fn comments(found: &[(ParameterEstimate, ParameterLocation)]) -> String {
+fn comments(found: &[(FittedParameter, ParameterLocation)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
     let mut last = "";
-    for (ParameterEstimate { name, unit, value, std, initial, identifiable, rigid, .. }, _) in found {
+    for (FittedParameter { name, unit, value, std, initial, identifiable, rigid, .. }, _) in found {
         // Tied parameters have several places.
         if std::mem::replace(&mut last, name) == name {
             continue;
@@ -191,7 +191,7 @@ fn inside<'a>(table: &'a mut dyn TableLike, keys: &[&str]) -> Option<&'a mut Ite
 
 /// Sets a number, or one of a list. Without an entry a list of several numbers or a matrix is scaled by
 /// the ratio of new to initial value.
-fn put_number(item: &mut Item, entry: Option<usize>, found: &ParameterEstimate) -> Option<()> {
+fn put_number(item: &mut Item, entry: Option<usize>, found: &FittedParameter) -> Option<()> {
     let number = exact(found.value);
     match (item.as_value_mut()?, entry) {
         (Value::Array(list), Some(k)) => replace(list.get_mut(k)?, number),
@@ -244,7 +244,7 @@ fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, 
 /// Writes the pose of the tool, moved and rotated about its own axes by the identified values.
 fn put_tool(
     file: &mut DocumentMut,
-    found: &[(ParameterEstimate, ParameterLocation)],
+    found: &[(FittedParameter, ParameterLocation)],
     tool: (&str, &Pose),
 ) -> Option<()> {
     let mut shift = [0.0; 6];
@@ -275,7 +275,7 @@ fn put_tool(
 /// Writes the corrections of joint frames: those of the old file followed by the identified ones.
 fn put_frames(
     file: &mut DocumentMut,
-    found: &[(ParameterEstimate, ParameterLocation)],
+    found: &[(FittedParameter, ParameterLocation)],
     calibrations: &[Calibration],
 ) -> Option<()> {
     let mut corrections: Vec<(Calibration, Pose)> = Vec::new();

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
+use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, FittedParameter};
 use crate::estimation::least_squares::{
     Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, misfit, solve,
 };
@@ -74,7 +74,7 @@ pub fn identify(
     };
     let solution = fit.searched(&unknowns)?;
     let found = fit.summary(&unknowns, solution, before, options.folds);
-    let sound = |p: &ParameterEstimate| p.value.is_finite() && (p.std.is_finite() || !p.identifiable);
+    let sound = |p: &FittedParameter| p.value.is_finite() && (p.std.is_finite() || !p.identifiable);
     match found.parameters.iter().all(sound) {
         true => Ok(found),
         false => Err(IdentifyError::NotFinite),
@@ -313,7 +313,7 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
 /// Returns the estimate of a parameter.
 ///
 /// * `z`: unknown of the fit; `std`: its posterior standard deviation.
-fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> ParameterEstimate {
+fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> FittedParameter {
     let learnt = unknown.prior.is_none_or(|(_, prior)| std <= LEARNT * prior);
     let above_zero = z - INTERVAL * std > 0.0;
     let identifiable = learnt
@@ -327,7 +327,7 @@ fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> Param
         true => parameter.interval(z - INTERVAL * std, z + INTERVAL * std),
         false => [f64::NAN; 2],
     };
-    ParameterEstimate {
+    FittedParameter {
         name: parameter.name.clone(),
         unit: parameter.unit.clone(),
         initial: parameter.initial,

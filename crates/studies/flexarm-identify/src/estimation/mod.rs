@@ -24,12 +24,12 @@ mod sensitivity;
 mod slips;
 
 pub use encoders::{GearEstimate, GearOutput, gear_stiffness};
-pub use identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
+pub use identified::{HeldOut, Identified, IdentifyError, ModelError, FittedParameter};
 pub use identify::{IdentifyOptions, identify};
 pub use least_squares::{Loss, Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, solve};
 pub use measurement::{MeasuredArm, NoAnswer};
 pub use parameter::{Effect, LinkPart, NominalArm, Parameter, SpringPart};
-pub use plan::{Candidate, Plan, PlanOptions, plan};
+pub use plan::{Plan, PlanOptions, plan};
 pub use reading::{
     Component, Form, Instrument, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
     Target,
