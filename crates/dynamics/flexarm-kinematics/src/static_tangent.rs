@@ -414,13 +414,40 @@ impl StaticTangent {
 
     /// Adds to `dtau` the change of the static forces on the coordinates from the first one on, as
     /// the subtree of a body moves with a twist (world axes, about the world origin) while all
-    /// coordinates keep their values: (3) and (4) with the body's joint frame as another joint. Call
-    /// [`StaticTangent::compute`] before.
+    /// coordinates keep their values: (3) and (4) with the body's joint frame as another joint; closed
+    /// loops follow. Returns the twist of the body `seen`. Call [`StaticTangent::compute`] before.
     ///
     /// # Panics
-    /// If the model has closed loops or balancers.
-    pub fn add_moved_subtree(&self, model: &Model, data: &Data, body: usize, moved: &Twist, dtau: &mut [f64]) {
-        assert!(model.loops.is_empty() && model.balancers.is_empty(), "loops and balancers are not covered");
+    /// If the model has balancers.
+    pub fn add_moved_subtree(
+        &mut self,
+        model: &Model,
+        data: &Data,
+        (body, moved): (usize, &Twist),
+        seen: usize,
+        dtau: &mut [f64],
+    ) -> Twist {
+        let mut twist = if model.is_in_subtree(seen, body) { *moved } else { Twist::zeros() };
+        let Some(mut tangent) = self.loops.take() else {
+            self.add_moved_in_tree(model, data, body, moved, dtau);
+            return twist;
+        };
+        let mut dtree = vec![0.0; tangent.G.nrows()];
+        self.add_moved_in_tree(model, data, body, moved, &mut dtree);
+        let forces = (&self.tau_d[..], &mut dtree[..]);
+        let rates = tangent.add_moved_subtree(model, data, self.first, (body, moved), forces, dtau);
+        let n = self.size(model);
+        for column in self.columns.iter().filter(|column| column.k >= n && model.is_in_subtree(seen, column.body)) {
+            let rate = rates[column.k - n];
+            twist += Twist::new(column.v * rate, column.w * rate);
+        }
+        self.loops = Some(tangent);
+        twist
+    }
+
+    /// [`Self::add_moved_subtree`] over all coordinates of the opened tree.
+    fn add_moved_in_tree(&self, model: &Model, data: &Data, body: usize, moved: &Twist, dtau: &mut [f64]) {
+        assert!(model.balancers.is_empty(), "balancers are not covered");
         let (v, w, end) = (&moved.linear, &moved.angular, model.bodies[body].subtree_end);
         let Carried { f, A, N, .. } = &self.carried[body];
         let (force, moment) = (A * w, N * w + v.cross(f));

@@ -78,7 +78,7 @@ pub use guide::{Guide, GuideTerm, Play};
 pub use integrator::{Current, Integrator, TimeGrid};
 pub use linear::{Linear, Tangents, linearise};
 pub use load::{Load, LoadAxes, TimedWrench};
-pub use modes::modes_at;
+pub use modes::{modes_at, modes_of};
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};

@@ -28,20 +28,30 @@ pub fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
     let na = model.n_actuated();
     state.q.rows_mut(na, n).copy_from(&equilibrium);
     let M = mass_matrix(model, &mut data, &state.q).view((na, na), (n, n)).clone_owned();
+    modes_of(&Kt, &M, t).map(|modes| Modes { equilibrium, ..modes })
+}
 
+/// Computes the undamped modes of a stiffness (symmetric) and a mass matrix, without equilibrium.
+///
+/// * `t`: time for messages.
+///
+/// # Errors
+/// [`StepError::Singular`].
+pub fn modes_of(Kt: &DMatrix<f64>, M: &DMatrix<f64>, t: f64) -> Result<Modes, StepError> {
+    let n = Kt.nrows();
     // K φ = ω² M φ with K = L Lᵀ: the eigenvalues of L^-1 M L^-T are 1/ω², so the low modes are the
     // largest and most accurate.
     let factor = Cholesky::new(Kt.clone())
         .ok_or(StepError::Singular { matrix: "static stiffness (with the effect of weight)", t })?;
     let L = factor.l();
     let singular = StepError::Singular { matrix: "stiffness factor", t };
-    let half = L.solve_lower_triangular(&M).ok_or(singular.clone())?;
+    let half = L.solve_lower_triangular(M).ok_or(singular.clone())?;
     let A = L.solve_lower_triangular(&half.transpose()).ok_or(singular.clone())?;
     let eigen = SymmetricEigen::new((&A + A.transpose()) * 0.5);
     let mut order: Vec<usize> = (0..n).collect();
     order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
 
-    let mut modes = Modes { omega: Vec::with_capacity(n), shapes: DMatrix::zeros(n, n), equilibrium, residual: 0.0 };
+    let mut modes = Modes { omega: Vec::with_capacity(n), shapes: DMatrix::zeros(n, n), ..Modes::default() };
     // φ = L^-T y, scaled to φᵀ M φ = 1; the residual checks the eigensolver.
     for (column, &k) in order.iter().enumerate() {
         let value = eigen.eigenvalues[k];
@@ -50,11 +60,11 @@ pub fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
         }
         let y = eigen.eigenvectors.column(k).clone_owned();
         let mut phi = L.tr_solve_lower_triangular(&y).ok_or(singular.clone())?;
-        let mut Mphi = &M * &phi;
+        let mut Mphi = M * &phi;
         let norm = phi.dot(&Mphi).sqrt();
         phi /= norm;
         Mphi /= norm;
-        let Kphi = &Kt * &phi;
+        let Kphi = Kt * &phi;
         modes.residual = modes.residual.max((&Kphi - Mphi / value).norm() / Kphi.norm());
         modes.omega.push(1.0 / value.sqrt());
         modes.shapes.set_column(column, &phi);

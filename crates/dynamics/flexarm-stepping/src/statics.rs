@@ -307,8 +307,15 @@ impl StaticSlopes {
     }
 
     /// [`StaticTangent::add_moved_subtree`], after [`StaticSlopes::compute`].
-    pub(crate) fn add_moved_subtree(&self, plant: &Plant, data: &Data, body: usize, moved: &Twist, p: &mut [f64]) {
-        self.exact.add_moved_subtree(&plant.model, data, body, moved, p);
+    pub(crate) fn add_moved_subtree(
+        &mut self,
+        plant: &Plant,
+        data: &Data,
+        moved: (usize, &Twist),
+        seen: usize,
+        p: &mut [f64],
+    ) -> Twist {
+        self.exact.add_moved_subtree(&plant.model, data, moved, seen, p)
     }
 
     fn difference(

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use flexarm::Robot;
 use flexarm::identify::{
-    EncoderFigures, Identification, IdentifyRequest, MeasurementPlan, ModelError, PlanRequest, Progress, Weight,
+    EncoderFigures, Identification, IdentifyRequest, MeasurementPlan, ModelError, PlanRequest, Progress,
     identify_robot_watched, plan_measurements,
 };
 
@@ -174,10 +174,8 @@ fn readable(unit: &str) -> (&str, f64) {
     }
 }
 
-/// Maximum number of undetermined combinations in the terminal.
-const MAX_COMBINATIONS: usize = 3;
-/// Maximum number of parameters in a combination in the terminal.
-const MAX_PARTS: usize = 4;
+/// Maximum number of groups of undetermined parameters in the terminal.
+const MAX_COMBINATIONS: usize = 6;
 
 fn text(found: &Identification) -> String {
     let Identification { robot, measurements, readings, numbers, .. } = found;
@@ -191,7 +189,10 @@ fn text(found: &Identification) -> String {
             shape.reading, shape.mode, shape.assurance, shape.assurance_before
         );
     }
-    out += &combination_lines(&found.untold);
+    found.combinations.iter().take(MAX_COMBINATIONS).for_each(|text| out += &format!("{text}\n"));
+    if let Some(more) = found.combinations.len().checked_sub(MAX_COMBINATIONS).filter(|more| *more > 0) {
+        out += &format!("only together: {more} more groups (--json and the page list them)\n");
+    }
     for s in &found.suspicious {
         out += &format!(
             "contradicts the others: {}, measured {}, expected {} ({:.1} deviations)\n",
@@ -283,21 +284,6 @@ fn encoder_line(gear: &EncoderFigures) -> String {
         unseen.join(", "),
         if gear.told { "" } else { ": not determined" }
     )
-}
-
-/// Lists the first combinations of parameters that the readings do not determine.
-fn combination_lines(untold: &[Vec<Weight>]) -> String {
-    let mut out = String::new();
-    for combination in untold.iter().take(MAX_COMBINATIONS) {
-        let of = |w: &Weight| format!("{:+.2} {}", w.weight, w.name);
-        let parts: Vec<String> = combination.iter().take(MAX_PARTS).map(of).collect();
-        let more = if combination.len() > MAX_PARTS { " ..." } else { "" };
-        out += &format!("not determined: {}{more}\n", parts.join(" "));
-    }
-    if let Some(more) = untold.len().checked_sub(MAX_COMBINATIONS).filter(|more| *more > 0) {
-        out += &format!("not determined: {more} more combinations (--json and the page list them)\n");
-    }
-    out
 }
 
 fn plan_text(found: &MeasurementPlan) -> String {

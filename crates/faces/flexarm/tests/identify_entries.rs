@@ -3,7 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm::identify::{IdentifyRequest, identify_robot, link_entries};
+use flexarm::identify::{IdentifyRequest, identify_robot, parameters_like};
 use flexarm::sensitivity::pose_sensitivity;
 use flexarm::{LinkModel, Modelling, Robot, Wrench};
 use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
@@ -51,7 +51,7 @@ fn with_stiffness(K: &Matrix6<f64>) -> String {
 fn matrix(robot: &Robot) -> Matrix6<f64> {
     let arm = robot.model(&Modelling::default()).unwrap();
     let mut K = Matrix6::zeros();
-    for p in link_entries(&arm).iter().filter(|p| p.name.starts_with("link.link_2.")) {
+    for p in parameters_like(&arm, "link.link_2.stiffness[*][*]") {
         let digits: Vec<usize> = p.name.chars().filter_map(|c| c.to_digit(10)).map(|d| d as usize).collect();
         let (i, j) = (digits[1], digits[2]);
         (K[(i, j)], K[(j, i)]) = (p.initial, p.initial);

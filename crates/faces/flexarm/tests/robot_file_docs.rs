@@ -274,6 +274,7 @@ fn the_schemas_have_the_same_keys() {
         ("guide", "GuideEntry"),
         ("tilt", "TiltEntry"),
         ("calibration", "CalibrationEntry"),
+        ("inertial", "InertialEntry"),
         ("strain_gauge", "StrainGaugeEntry"),
         ("stress_point", "StressPointEntry"),
     ];

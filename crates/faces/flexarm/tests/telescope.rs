@@ -101,7 +101,7 @@ fn calibrated_frames_and_zeros_move_the_tcp_as_frames_of_the_urdf_do() {
 }
 
 #[test]
-fn wrong_guides_connections_and_calibrations_are_refused_with_place_and_remedy() {
+fn wrong_guides_connections_calibrations_and_masses_are_refused_with_place_and_remedy() {
     let folder = Folder::new("refused");
     let drive = |joint: &str, gearbox: &str| {
         format!("[[drive]]\njoint = \"{joint}\"\nkind = \"gearbox\"\ngearbox = {{ {gearbox} }}\n")
@@ -125,6 +125,11 @@ fn wrong_guides_connections_and_calibrations_are_refused_with_place_and_remedy()
             "[[calibration]]\njoint = \"turn\"\nzero = 0.1\n[[calibration]]\njoint = \"turn\"\n".to_owned(),
             &["two [[calibration]]"],
         ),
+        ("[[inertial]]\nlink = \"am\"\nmass = 3.0\n".to_owned(), &["link \"am\" is not a link", "robot.toml:5"]),
+        ("[[inertial]]\nlink = \"tcp\"\nmass = 3.0\n".to_owned(), &["no mass that could be changed"]),
+        ("[[inertial]]\nlink = \"arm\"\nmass = -3.0\n".to_owned(), &["expected a positive number of kg"]),
+        ("[[inertial]]\nlink = \"arm\"\ncom = [0.0, nan, 0.0]\n".to_owned(), &["inertial com"]),
+        ("[[inertial]]\nlink = \"arm\"\n[[inertial]]\nlink = \"arm\"\n".to_owned(), &["two [[inertial]]"]),
     ] {
         let message = folder.robot(&text).unwrap_err().to_string();
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");

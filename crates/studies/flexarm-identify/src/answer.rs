@@ -3,16 +3,16 @@
 use std::path::Path;
 
 use crate::estimation::{
-    Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, NominalArm, Parameter, ParameterEstimate,
+    FittedParameter, Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, NominalArm, Parameter,
     Reading, ReadingKind, Target,
 };
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Vector3};
 use serde::Serialize;
 
-use super::doubts::caveats;
+use super::doubts::{caveats, combinations};
 use super::encoders::EncoderFigures;
-use super::error::IdentifyFileError;
+use super::error::refused;
 use super::file::MeasurementInput;
 use flexarm_run::Error;
 use flexarm_run::Finding;
@@ -38,6 +38,9 @@ pub struct Identification {
     pub correlation: Vec<Vec<f64>>,
     /// Combinations that the readings do not determine.
     pub untold: Vec<Vec<Weight>>,
+    /// Parameters that the readings do not determine, and those that they determine only together, in
+    /// words.
+    pub combinations: Vec<String>,
     /// RMS of the residuals.
     pub residual: Residual,
     /// RMS of cross-validation residuals; null with fewer than two readings.
@@ -71,44 +74,12 @@ pub struct Identification {
     pub caveats: Vec<Finding>,
     /// Sentences of the caveats that are warnings.
     pub warnings: Vec<String>,
-    /// Descriptions of the instruments and targets.
-    #[serde(skip)]
-    pub frames: Vec<String>,
     /// Frequency responses: measured, predicted before and after.
     #[serde(skip)]
     pub responses: Vec<ResponseCurves>,
     /// Measured numbers: measured, predicted before and after.
     #[serde(skip)]
     pub compared: Vec<Compared>,
-}
-
-/// Estimate of a number of the robot file.
-#[derive(Clone, Debug, Serialize)]
-pub struct FittedParameter {
-    /// Name, as in the robot file.
-    pub name: String,
-    /// Unit of the values.
-    pub unit: String,
-    /// Initial value.
-    pub initial: f64,
-    /// Value of the fit, which the new robot file has, whether or not the readings determine it.
-    pub value: f64,
-    /// Standard deviation; NaN (null in JSON) if the parameter is not identifiable.
-    pub std: f64,
-    /// 95 % confidence interval; NaN (nulls) if the parameter is neither identifiable nor rigid. The
-    /// upper end of a stiffness that is rigid within the readings is infinite (null).
-    pub interval: [f64; 2],
-    /// Whether the readings determine the parameter.
-    pub identifiable: bool,
-    /// Whether a spring or a clearance is rigid within the readings.
-    pub rigid: bool,
-}
-
-impl FittedParameter {
-    fn of(found: &ParameterEstimate) -> Self {
-        let ParameterEstimate { name, unit, initial, value, std, interval, identifiable, rigid } = found.clone();
-        Self { name, unit, initial, value, std, interval, identifiable, rigid }
-    }
 }
 
 /// Parameter in a combination.
@@ -242,51 +213,6 @@ fn kind_of(reading: &Reading) -> &'static str {
 /// Returns the name of the link on which a target is.
 fn link_of(input: &MeasurementInput, target: usize) -> &str {
     input.measurements.links.get(target).and_then(Option::as_ref).map_or("tcp", |frame| &frame.name)
-}
-
-/// Describes each instrument and target in a sentence.
-fn described(input: &MeasurementInput, found: &Identified) -> Vec<String> {
-    let millimetres = |v: &Vector3<f64>| format!("{:.3}, {:.3}, {:.3} mm", 1e3 * v.x, 1e3 * v.y, 1e3 * v.z);
-    let deviation = |of: &dyn Fn(&ReadingKind) -> Option<String>| {
-        input.measurements.readings.iter().find_map(|reading| of(&reading.kind)).unwrap_or_default()
-    };
-    let instruments = input.instruments.iter().enumerate().map(|(k, name)| {
-        let X_WI = found.instruments[k].inverse();
-        let (r, p, y) = X_WI.rotation.euler_angles();
-        let turn = [r, p, y].map(|x| format!("{:.4}", x.to_degrees())).join(", ");
-        let said = deviation(&|kind| match kind {
-            ReadingKind::InstrumentAt { instrument, std, std_rotation, .. } if *instrument == k => {
-                let place = std.map(|std| format!("{:.3} mm and ", 1e3 * std)).unwrap_or_default();
-                Some(format!(", prior standard deviation {place}{:.3} mrad", 1e3 * std_rotation))
-            }
-            _ => None,
-        });
-        match &input.measurements.instruments[k] {
-            Instrument::Axes(_) => {
-                format!("Instrument {name}: orientation {turn} degrees (roll, pitch, yaw; found){said}.")
-            }
-            given => {
-                let how = if matches!(given, Instrument::Known(_)) { "given" } else { "found" };
-                let at = millimetres(&X_WI.translation.vector);
-                format!(
-                    "Instrument {name}: position {at} in the world, orientation {turn} degrees (roll, pitch, yaw; \
-                     {how}){said}."
-                )
-            }
-        }
-    });
-    let targets = input.targets.iter().enumerate().map(|(k, name)| {
-        let how = if matches!(input.measurements.targets[k], Target::Known(_)) { "given" } else { "found" };
-        let said = deviation(&|kind| match kind {
-            ReadingKind::TargetAt { target, std, .. } if *target == k => {
-                Some(format!(", prior standard deviation {:.3} mm", 1e3 * std))
-            }
-            _ => None,
-        });
-        let at = millimetres(&found.targets[k]);
-        format!("Target {name}: position {at} in the axes of {} ({how}){said}.", link_of(input, k))
-    });
-    instruments.chain(targets).collect()
 }
 
 /// Returns the magnitudes of the responses from the compared numbers.
@@ -430,9 +356,10 @@ pub(super) fn answer(
         measurements: path.display().to_string(),
         readings: measurements.readings.len(),
         numbers: compared.len(),
-        parameters: found.parameters.iter().map(FittedParameter::of).collect(),
+        parameters: found.parameters.clone(),
         correlation: (0..p).map(|i| (0..p).map(|j| found.correlation[(i, j)]).collect()).collect(),
         untold: found.untold.iter().map(weights).collect(),
+        combinations: combinations(found),
         residual,
         held_out,
         misfit: found.misfit,
@@ -449,7 +376,6 @@ pub(super) fn answer(
         page: None,
         caveats: caveats(found),
         warnings: Vec::new(),
-        frames: described(input, found),
         responses: responses(measurements, &compared),
         compared,
     })
@@ -462,9 +388,7 @@ fn shapes(
     unknowns: &DVector<f64>,
 ) -> Result<Vec<ShapeFigures>, Error> {
     let arm = MeasuredArm { nominal, parameters: fitted, measurements };
-    let of = |unknowns: &DVector<f64>| {
-        arm.assurances(unknowns).map_err(|error| Error::from(IdentifyFileError::Fit(error.to_string())))
-    };
+    let of = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(|error| refused(error.to_string()));
     let (before, after) = (of(&DVector::zeros(unknowns.len()))?, of(unknowns)?);
     let figures = before.iter().zip(after).map(|((_, _, before), (number, mode, assurance))| ShapeFigures {
         reading: measurements.readings[number].name.clone(),

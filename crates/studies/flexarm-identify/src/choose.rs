@@ -2,9 +2,9 @@
 
 use crate::estimation::{Probe, Reading, ReadingKind};
 
-use super::error::{IdentifyFileError, at_place};
+use super::error::{at_place, refused};
 use super::file::MeasurementInput;
-use super::parameters::{self, Candidate, ParameterLocation, TieError};
+use super::parameters::{self, Candidate, ParameterLocation};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Robot;
@@ -24,13 +24,18 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     let mut chosen: Vec<_> = all.clone();
     chosen.retain(|c| wanted(&c.parameter.name) && !kept(&c.parameter.name));
     if chosen.is_empty() && arm.springs.is_empty() {
-        return Err(IdentifyFileError::NothingGives.into());
+        return Err(refused(
+            "the robot has no flexible link and no elastic drive: there is no stiffness to identify; add \
+             [[flexible_link]] or [[drive]] entries with initial values, or fit its frames by fit = [\"joint.*\"]",
+        ));
     }
     if chosen.is_empty() {
-        return Err(IdentifyFileError::NothingFitted { known: listed(&all) }.into());
+        return Err(refused(format!("there is no parameter to fit: all of {:?} are kept", listed(&all))));
     }
     if let Some((entry, factor)) = said_twice(&chosen) {
-        return Err(IdentifyFileError::Twice { entry, factor }.into());
+        return Err(refused(format!(
+            "{entry} and {factor} describe the same stiffness: fit one of them and keep the other"
+        )));
     }
     for (pattern, place) in &input.tie {
         tie(&mut chosen, pattern).map_err(|error| at_place(place, format!("tie {pattern:?}: {error}")))?;
@@ -40,12 +45,12 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
 }
 
 /// Gives all parameters that match a pattern one value, under the name of the pattern.
-fn tie(chosen: &mut Vec<Candidate>, pattern: &str) -> Result<(), TieError> {
+fn tie(chosen: &mut Vec<Candidate>, pattern: &str) -> Result<(), String> {
     let (matching, others): (Vec<_>, Vec<_>) =
         std::mem::take(chosen).into_iter().partition(|c| parameters::fits(pattern, &c.parameter.name));
     *chosen = others;
     let mut matching = matching.into_iter();
-    let mut first = matching.next().ok_or(TieError::NoMatch)?;
+    let mut first = matching.next().ok_or("no parameter that is fitted matches it")?;
     matching.try_for_each(|other| first.tie(&other))?;
     pattern.clone_into(&mut first.parameter.name);
     chosen.push(first);
@@ -67,7 +72,7 @@ fn check_patterns(all: &[Candidate], input: &MeasurementInput, fit: &[String]) -
         return Err(at_place(place, unknown(pattern)));
     }
     match fit.iter().find(|pattern| !matches(pattern)) {
-        Some(pattern) => Err(IdentifyFileError::UnknownParameter { text: unknown(pattern) }.into()),
+        Some(pattern) => Err(refused(unknown(pattern))),
         None => Ok(()),
     }
 }
@@ -124,7 +129,11 @@ fn said_twice(chosen: &[Candidate]) -> Option<(String, String)> {
 pub(super) fn check_tool(robot: &Robot, chosen: &[Candidate], input: &MeasurementInput) -> Result<(), Error> {
     let Some(tool) = chosen.iter().find(|c| matches!(c.written, ParameterLocation::Tool { .. })) else { return Ok(()) };
     if let Some(link) = &robot.tcp_override {
-        return Err(IdentifyFileError::OtherTool { name: tool.parameter.name.clone(), link: link.clone() }.into());
+        return Err(refused(format!(
+            "{} describes the tool of the robot file, but link {link:?} was chosen as the TCP at loading: do not choose \
+             it",
+            tool.parameter.name
+        )));
     }
     let on_tool = |probe: &Probe| probe.frame.name == TCP_FRAME;
     let mut readings = input.measurements.readings.iter();
@@ -134,10 +143,11 @@ pub(super) fn check_tool(robot: &Robot, chosen: &[Candidate], input: &Measuremen
         _ => false,
     });
     match seen {
-        Some(Reading { name: reading, .. }) => {
-            let name = tool.parameter.name.clone();
-            Err(IdentifyFileError::ToolNode { name, reading: reading.clone() }.into())
-        }
+        Some(Reading { name: reading, .. }) => Err(refused(format!(
+            "{reading} is measured or excited at a node on the tool, which {} would move: define the node on the link \
+             that carries the sensor, with its position there",
+            tool.parameter.name
+        ))),
         None => Ok(()),
     }
 }

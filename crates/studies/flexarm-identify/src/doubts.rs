@@ -1,6 +1,6 @@
 //! Caveats about an identification.
 
-use crate::estimation::{Identified, MeasuredArm, NominalArm, ParameterEstimate, ReadingKind};
+use crate::estimation::{Identified, MeasuredArm, NominalArm, FittedParameter, ReadingKind};
 use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
@@ -58,15 +58,10 @@ pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
             format!("the residuals are {factor:.2} times as large as the standard deviations of the readings: {cause}");
         caveats.push(Finding::warning("misfit", "measurements", text, remedy));
     }
-    let unsure = |p: &&ParameterEstimate| !p.identifiable && !p.rigid;
-    let unsure: Vec<&str> = found.parameters.iter().filter(unsure).map(|p| p.name.as_str()).collect();
-    if !unsure.is_empty() {
-        let text = format!(
-            "these readings do not determine {} of {} parameters alone: {}",
-            unsure.len(),
-            found.parameters.len(),
-            grouped(&unsure)
-        );
+    let unsure = |p: &&FittedParameter| !p.identifiable && !p.rigid;
+    let unsure = found.parameters.iter().filter(unsure).count();
+    if unsure > 0 {
+        let text = format!("these readings do not determine {unsure} of {} parameters alone", found.parameters.len());
         let remedy = "add readings at the poses of a measurement plan, or keep values that you know";
         caveats.push(Finding::warning("not-identifiable", "measurements", text, remedy));
     }
@@ -90,28 +85,49 @@ pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
     caveats
 }
 
-/// Maximum number of names in a message.
-const MAX_NAMES: usize = 8;
+/// Says in words which parameters the readings do not determine, and which only together.
+pub(super) fn combinations(found: &Identified) -> Vec<String> {
+    let (alone, together): (Vec<_>, Vec<_>) = found.together.iter().partition(|group| group.len() == 1);
+    let said = |group: &[usize]| in_words(group.iter().map(|k| found.parameters[*k].name.as_str()));
+    let none: Vec<usize> = alone.into_iter().flatten().copied().collect();
+    let none = (!none.is_empty()).then(|| format!("not determined: {}", said(&none)));
+    none.into_iter().chain(together.into_iter().map(|group| format!("only together: {}", said(group)))).collect()
+}
 
-/// Lists names; those that differ in their last part alone as one.
-fn grouped(names: &[&str]) -> String {
-    let mut groups: Vec<(&str, Vec<&str>)> = Vec::new();
+/// Lists parameters in words; those of one kind as one.
+fn in_words<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let mut kinds: Vec<(String, Vec<String>)> = Vec::new();
     for name in names {
-        let (head, last) = name.rsplit_once('.').unwrap_or(("", name));
-        match groups.last_mut().filter(|(own, _)| *own == head && !head.is_empty()) {
-            Some((_, lasts)) => lasts.push(last),
-            None => groups.push((head, vec![last])),
+        let (what, whose) = words(name);
+        match kinds.iter_mut().find(|(own, _)| *own == what) {
+            Some((_, all)) => all.push(whose),
+            None => kinds.push((what, vec![whose])),
         }
     }
-    let one = |(head, lasts): &(&str, Vec<&str>)| match (head.is_empty(), &lasts[..]) {
-        (true, lasts) => lasts.join(", "),
-        (false, [last]) => format!("{head}.{last}"),
-        (false, lasts) => format!("{head}.{{{}}}", lasts.join(", ")),
+    let all = kinds.iter().map(|(what, whose)| format!("{what} of {}", whose.join(", ")));
+    all.collect::<Vec<_>>().join("; ")
+}
+
+/// Returns what a parameter is, and of what.
+fn words(name: &str) -> (String, String) {
+    let (kind, rest) = name.split_once('.').unwrap_or(("parameter", name));
+    let (whose, last) = rest.rsplit_once('.').unwrap_or(("", rest));
+    let (what, whose) = match (kind, last) {
+        ("joint" | "tcp", "x" | "y" | "z") => (format!("shift along {last}"), whose),
+        ("joint" | "tcp", "roll" | "rx") => ("rotation about x".into(), whose),
+        ("joint" | "tcp", "pitch" | "ry") => ("rotation about y".into(), whose),
+        ("joint" | "tcp", "yaw" | "rz") => ("rotation about z".into(), whose),
+        ("link", "x" | "y" | "z") => {
+            (format!("centre of mass along {last}"), whose.strip_suffix(".com").unwrap_or(whose))
+        }
+        _ => (last.to_owned(), whose.strip_suffix(".gearbox").unwrap_or(whose)),
     };
-    let mut all: Vec<String> = groups.iter().take(MAX_NAMES).map(one).collect();
-    let more: usize = groups.iter().skip(MAX_NAMES).map(|(_, lasts)| lasts.len()).sum();
-    all.extend((more > 0).then(|| format!("and {more} more")));
-    all.join(", ")
+    let of = match (whose, kind) {
+        ("", "tcp") => "the tool".to_owned(),
+        ("", _) => format!("the {kind}"),
+        _ => whose.to_owned(),
+    };
+    (what, of)
 }
 
 /// Returns a caveat about gear effects that the fit does not include.

@@ -1,12 +1,10 @@
 //! Gear stiffness from recorded positions of motors and links: torques of the rigid robot along the
 //! motion of its links, filters, and the reading for the fit.
 
-use crate::estimation::{
-    CoupledOutput, GearEstimate, GearRun, Parameter, Reading, ReadingKind, coupled_gear_stiffness, gear_stiffness,
-};
+use crate::estimation::{GearEstimate, GearOutput, Parameter, Reading, ReadingKind, gear_stiffness};
 use flexarm_analysis::signal::LowPass;
 use flexarm_kinematics::{Data, Mechanism, Model, State, inverse_dynamics};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::error::at_place;
@@ -14,7 +12,6 @@ use super::file::{EncoderRecording, MeasurementInput};
 use super::parameters::{Candidate, ParameterLocation, candidates};
 use flexarm_run::Arm;
 use flexarm_run::Error;
-use flexarm_run::RobotCoupling;
 
 /// Result for one gear from recordings. SI units.
 #[derive(Clone, Debug, Serialize)]
@@ -64,7 +61,6 @@ impl EncoderFigures {
             noise_rms,
             // A single run is split into two halves.
             steps_s: if steps_s.len() == 1 { vec![steps_s[0]; gear.curves.len()] } else { steps_s.to_vec() },
-
             joint: joint.to_owned(),
             stiffness: gear.stiffness,
             std: gear.std_ln.hypot(unexplained(&gear, noise_rms)) * gear.stiffness.abs(),
@@ -105,7 +101,9 @@ pub(super) fn encoder_figures(
     input: &MeasurementInput,
     chosen: &[Candidate],
 ) -> Result<Vec<EncoderFigures>, Error> {
-    let Some(first) = input.recordings.first() else { return Ok(Vec::new()) };
+    if input.recordings.is_empty() {
+        return Ok(Vec::new());
+    }
     let model = link_side(&arm.robot().rigid)
         .map_err(|source| Error::Model { path: arm.robot().urdf_path.clone(), source: Box::new(source) })?;
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
@@ -116,30 +114,16 @@ pub(super) fn encoder_figures(
     let filed: Vec<Option<f64>> = joints.iter().map(filed).collect();
     let runs = input.recordings.iter().map(|recording| Smooth::of(recording, &model, &filed));
     let runs = runs.collect::<Result<Vec<_>, Error>>()?;
+    let single = joints.iter().filter(|joint| !is_coupled(joint)).map(|joint| {
+        let C = DMatrix::from_element(1, 1, 1.0);
+        Gears::of(&runs, &joints, (std::slice::from_ref(joint), C), chosen, &all)
+    });
+    let coupled = coupling.map(|own| Gears::of(&runs, &joints, (&own.joints, own.C.clone()), chosen, &all));
     let mut found = Vec::new();
-    for (k, joint) in joints.iter().enumerate() {
-        if is_coupled(joint) {
-            continue;
+    for gears in single.chain(coupled) {
+        if let Some(gears) = gears? {
+            found.extend(gears.figures()?);
         }
-        let own: Vec<GearRun> = runs.iter().filter_map(|run| run.gear(k)).collect();
-        if own.is_empty() {
-            continue;
-        }
-        let Some(parameter) = gearbox_of(chosen, joint) else {
-            let text = format!("joint {joint:?} has an encoder, but no gearbox with a single stiffness to fit");
-            return Err(at_place(&first.place, text));
-        };
-        let Some(gear) = gear_stiffness(&own) else {
-            let text =
-                format!("joint {joint:?}: the recordings are too short (minimum 2 s), or its torque does not change");
-            return Err(at_place(&first.place, text));
-        };
-        found.push(EncoderFigures::of(joint, gear, parameter, noise(&runs, k), &steps(&runs, k)));
-    }
-    if let Some(coupling) = coupling
-        && let Some(gears) = CoupledGears::of(&runs, &joints, coupling, chosen, &all)?
-    {
-        found.extend(gears.figures()?);
     }
     Ok(found)
 }
@@ -163,99 +147,94 @@ fn gearbox_of<'a>(of: &'a [Candidate], joint: &str) -> Option<&'a Parameter> {
     of.iter().find(is_it).map(|c| &c.parameter)
 }
 
-/// Recordings of gears whose motors move several joints.
-struct CoupledGears<'a> {
+/// Recordings of gears whose motors move joints together; of one gear where they do not.
+struct Gears<'a> {
     runs: &'a [Smooth<'a>],
-    coupling: &'a RobotCoupling,
+    joints: &'a [String],
+    /// Joint per motor angle behind the gears.
+    C: DMatrix<f64>,
     /// Parameters of all springs, with the stiffness of the robot file.
     all: &'a [Candidate],
-    /// Coupled joints in the robot's order of joints.
+    /// These joints in the robot's order of joints.
     places: Vec<usize>,
-    /// Coupled joints with an encoder on the link side.
+    /// Joints with an encoder on the link side.
     seen: Vec<usize>,
     /// Motors whose springs are to be identified.
     unknown: Vec<(usize, &'a Parameter)>,
 }
 
-impl<'a> CoupledGears<'a> {
-    /// Returns what the recordings show of the coupled gears; `None` without an encoder on their
-    /// link sides.
+impl<'a> Gears<'a> {
+    /// Returns what the recordings show of some gears; `None` without an encoder on their link sides.
     fn of(
         runs: &'a [Smooth<'a>],
-        joints: &[String],
-        coupling: &'a RobotCoupling,
+        of_robot: &[String],
+        (joints, C): (&'a [String], DMatrix<f64>),
         chosen: &'a [Candidate],
         all: &'a [Candidate],
     ) -> Result<Option<Self>, Error> {
-        let place = |joint: &String| joints.iter().position(|own| own == joint);
-        let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();
+        let place = |joint: &String| of_robot.iter().position(|own| own == joint);
+        let places: Vec<usize> = joints.iter().filter_map(place).collect();
         let has = |run: &Smooth<'_>, k: usize| run.recording.link[places[k]].is_some();
         let seen: Vec<usize> = (0..places.len()).filter(|k| runs.iter().any(|r| has(r, *k))).collect();
         if seen.is_empty() {
             return Ok(None);
         }
         let file = &runs[0].recording.place;
-        if let Some(k) = seen.iter().find(|k| !runs.iter().all(|r| has(r, **k))) {
-            let joint = &coupling.joints[*k];
+        let missing = |k: &&usize| joints.len() > 1 && !runs.iter().all(|r| has(r, **k));
+        if let Some(k) = seen.iter().find(missing) {
             let text = format!(
-                "joint {joint:?} has coupled gears, and only some recordings contain its encoder: give it in all of \
-                 them"
+                "joint {:?} has coupled gears, and only some recordings contain its encoder: give it in all of them",
+                joints[*k]
             );
             return Err(at_place(file, text));
         }
-        let shown = |motor: &usize| seen.iter().any(|i| coupling.C[(*i, *motor)] != 0.0);
+        let shown = |motor: &usize| seen.iter().any(|i| C[(*i, *motor)] != 0.0);
         let unknown: Vec<(usize, &Parameter)> = (0..places.len())
             .filter(shown)
-            .filter_map(|motor| Some((motor, gearbox_of(chosen, &coupling.joints[motor])?)))
+            .filter_map(|motor| Some((motor, gearbox_of(chosen, &joints[motor])?)))
             .collect();
         if unknown.is_empty() {
-            let names: Vec<&String> = seen.iter().map(|k| &coupling.joints[*k]).collect();
-            let text = format!("joints {names:?} have encoders, but none of the gearboxes that they measure is fitted");
+            let names: Vec<&String> = seen.iter().map(|k| &joints[*k]).collect();
+            let text = format!("{names:?} have encoders, but no gearbox with a single stiffness to fit");
             return Err(at_place(file, text));
         }
-        Ok(Some(Self { runs, coupling, all, places, seen, unknown }))
+        Ok(Some(Self { runs, joints, C, all, places, seen, unknown }))
     }
 
     /// Returns the deflection of a joint per compliance of a motor's spring, `C_im Σ_j C_jm τ_j`,
     /// over time.
     fn per_compliance(&self, run: &Smooth<'_>, torque: &[Vec<f64>], i: usize, motor: usize) -> Vec<f64> {
-        let C = &self.coupling.C;
+        let C = &self.C;
         let of = |s: usize| self.places.iter().enumerate().map(|(j, k)| C[(j, motor)] * torque[*k][s]).sum::<f64>();
         run.seen.clone().map(|s| C[(i, motor)] * of(s)).collect()
     }
 
     /// Returns the deflection of a joint that the springs to be identified cause. Springs that are
     /// not to be identified keep the stiffness of the robot file; rigid gears do not deflect.
-    fn output(&self, run: &Smooth<'_>, i: usize) -> Option<CoupledOutput> {
+    fn output(&self, run: &Smooth<'_>, i: usize) -> Option<GearOutput> {
         let mut gear = run.gear(self.places[i])?;
         let is_unknown = |motor: usize| self.unknown.iter().any(|(own, _)| *own == motor);
         for motor in (0..self.places.len()).filter(|motor| !is_unknown(*motor)) {
-            let Some(known) = gearbox_of(self.all, &self.coupling.joints[motor]) else { continue };
+            let Some(known) = gearbox_of(self.all, &self.joints[motor]) else { continue };
             let part = self.per_compliance(run, &run.torque, i, motor);
             gear.deflection.iter_mut().zip(part).for_each(|(d, torque)| *d -= torque / known.initial);
         }
         let parts = |torque: &[Vec<f64>]| {
             self.unknown.iter().map(|(motor, _)| self.per_compliance(run, torque, i, *motor)).collect()
         };
-        Some(CoupledOutput {
-            torques: parts(&run.torque),
-            instruments: parts(&run.instrument),
-            deflection: gear.deflection,
-            rate: gear.rate,
-            deflection_rate: gear.deflection_rate,
-        })
+        Some(GearOutput { torques: parts(&run.torque), instruments: parts(&run.instrument), ..gear })
     }
 
     /// Estimates the springs of the motors.
     fn figures(&self) -> Result<Vec<EncoderFigures>, Error> {
         let outputs = |run: &Smooth<'_>| self.seen.iter().map(|i| self.output(run, *i)).collect();
-        let all_runs: Vec<Vec<CoupledOutput>> = self.runs.iter().filter_map(outputs).collect();
-        let name = |motor: usize| &self.coupling.joints[motor];
-        let gears = coupled_gear_stiffness(&all_runs).ok_or_else(|| {
+        let all_runs: Vec<Vec<GearOutput>> = self.runs.iter().filter_map(outputs).collect();
+        let name = |motor: usize| &self.joints[motor];
+        let gears = gear_stiffness(&all_runs).ok_or_else(|| {
             let names: Vec<&String> = self.unknown.iter().map(|(motor, _)| name(*motor)).collect();
             let text = format!(
-                "the recordings do not separate the coupled gears of {names:?}: they are too short (minimum 2 s), or \
-                 the torques are constant or proportional; record more encoders, or keep some of these stiffnesses"
+                "the recordings do not determine the gears of {names:?}: they are too short (minimum 2 s), or the \
+                 torques are constant or proportional; record more encoders, or keep some of these stiffnesses"
             );
             at_place(&self.runs[0].recording.place, text)
         })?;
@@ -336,18 +315,19 @@ impl<'a> Smooth<'a> {
         Ok(Self { recording, rate, torque, instrument, low, seen: edge..n - edge - 1 })
     }
 
-    fn gear(&self, joint: usize) -> Option<GearRun> {
+    /// Returns deflection and velocity of a joint with an encoder on its link side, without torques.
+    fn gear(&self, joint: usize) -> Option<GearOutput> {
         let link = self.recording.link[joint].as_ref()?;
         let cut = |x: &[f64]| x[self.seen.clone()].to_vec();
         let deflection: Vec<f64> =
             self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
         let deflection = self.low.of(&self.low.of(&deflection));
-        Some(GearRun {
+        Some(GearOutput {
             deflection_rate: cut(&derivatives(&deflection, self.recording.step_s)[0]),
             deflection: cut(&deflection),
-            torque: cut(&self.torque[joint]),
-            instrument: cut(&self.instrument[joint]),
             rate: cut(&self.rate[joint]),
+            torques: Vec::new(),
+            instruments: Vec::new(),
         })
     }
 

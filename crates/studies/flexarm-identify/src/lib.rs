@@ -44,7 +44,7 @@ use flexarm_files::{check_apart, check_free, write_all};
 use self::answer::answer;
 use self::choose::{check_tool, chosen};
 use self::doubts::{empty_caveat, encoder_caveats, frame_caveat, gear_caveat, load_caveats};
-use self::error::{of_names, of_slip};
+use self::error::{of_names, of_slip, refused};
 use self::file::{Cell, MeasurementInput};
 use self::parameters::ParameterLocation;
 use self::units::{check_modes, check_units};
@@ -56,7 +56,7 @@ use flexarm_run::caveat::Use;
 use flexarm_run::caveat::warnings;
 
 pub use self::answer::{
-    Compared, FittedParameter, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
+    Compared, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
     ShapeFigures, Suspicious, Weight,
 };
 pub use self::encoders::EncoderFigures;
@@ -70,36 +70,14 @@ pub fn nominal(arm: &Arm) -> NominalArm {
 
 /// Returns the identifiable parameters of an arm, with the names that files and `--fit` use.
 pub fn parameters(arm: &Arm) -> Vec<Parameter> {
-    let special = |name: &str| {
-        parameters::is_direction(name)
-            || parameters::is_entry(name)
-            || parameters::is_tool(name)
-            || parameters::is_frame(name)
-    };
-    candidates_that(arm, |name| !special(name))
+    parameters_like(arm, "*")
 }
 
-/// Returns the six directions of each lumped link's springs, `link.LINK.stiffness_factors[k]`.
-/// Together they are the link's stiffness, which [`parameters()`] contains as a single factor.
-pub fn link_directions(arm: &Arm) -> Vec<Parameter> {
-    candidates_that(arm, parameters::is_direction)
-}
-
-/// Returns the 21 entries of the 6x6 of each lumped link in two parts, `link.LINK.stiffness[i][j]`
-/// with `i <= j`, before the link's factors are applied.
-pub fn link_entries(arm: &Arm) -> Vec<Parameter> {
-    candidates_that(arm, parameters::is_entry)
-}
-
-/// Returns the displacements of the joint frames, `joint.JOINT.x` to `.roll`, and the zeros of the
-/// joints, `joint.JOINT.zero` (m, rad).
-pub fn frame_parameters(arm: &Arm) -> Vec<Parameter> {
-    candidates_that(arm, parameters::is_frame)
-}
-
-fn candidates_that(arm: &Arm, wanted: impl Fn(&str) -> bool) -> Vec<Parameter> {
-    let all = parameters::candidates(arm.robot(), arm).into_iter();
-    all.map(|c| c.parameter).filter(|parameter| wanted(&parameter.name)).collect()
+/// Returns the parameters that a pattern of `fit` selects, such as `joint.*`. `*` selects those of
+/// [`parameters()`]: without the parameters that a pattern must name.
+pub fn parameters_like(arm: &Arm, pattern: &str) -> Vec<Parameter> {
+    let all = parameters::candidates(arm.robot(), arm).into_iter().map(|c| c.parameter);
+    all.filter(|parameter| parameters::asks_for(pattern, &parameter.name)).collect()
 }
 
 /// Arguments of [`identify_robot`].
@@ -143,9 +121,10 @@ pub fn identify_robot_watched(
     let encoders = encoders::encoder_figures(&arm, &input, &chosen)?;
     input.measurements.readings.extend(encoders.iter().filter_map(EncoderFigures::reading));
     if input.measurements.readings.is_empty() {
-        return Err(
-            IdentifyFileError::NoGear { joints: encoders.iter().map(|gear| gear.joint.clone()).collect() }.into()
-        );
+        let joints: Vec<&String> = encoders.iter().map(|gear| &gear.joint).collect();
+        return Err(refused(format!(
+            "the recordings of {joints:?} do not determine a stiffness: deflection and torque are not correlated"
+        )));
     }
     let targets = match &request.output {
         Some(folder) => Some(Targets::in_folder(folder, robot, measurements, request.overwrite)?),
@@ -210,7 +189,7 @@ impl Targets {
     ) -> Result<(), Error> {
         let identified = found.parameters.iter().zip(chosen);
         let places = |c: &parameters::Candidate| std::iter::once(c.written.clone()).chain(c.tied.clone());
-        let identified: Vec<(ParameterEstimate, ParameterLocation)> =
+        let identified: Vec<(FittedParameter, ParameterLocation)> =
             identified.flat_map(|(p, c)| places(c).map(|place| (p.clone(), place))).collect();
         let text = flexarm_files::read_text(&robot.path)?;
         let home = robot.path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -218,7 +197,7 @@ impl Targets {
         // Relative paths from the new file need its folder to exist.
         std::fs::create_dir_all(folder).map_err(|source| Error::Write { path: folder.to_owned(), source })?;
         let new = rewrite::rewritten(&text, &identified, robot.tcp(), &robot.calibration, home, folder)
-            .map_err(|error| Error::File { path: robot.path.clone(), what: error.to_string() })?;
+            .map_err(|what| Error::File { path: robot.path.clone(), what })?;
         (answer.file, answer.page) = (Some(self.robot.display().to_string()), Some(self.page.display().to_string()));
         let page = page::html(answer);
         write_all(&[(self.robot, new), (self.page, page)])?;
@@ -234,6 +213,6 @@ pub mod internals {
     pub use crate::estimation::parameter::displacement;
     pub use crate::estimation::placement::rigid_fit;
     pub use crate::parameters::ParameterLocation;
-    pub use crate::rewrite::{RewriteError, rewritten};
-    pub use crate::uff::{UffError, UffFunction, read_functions};
+    pub use crate::rewrite::rewritten;
+    pub use crate::uff::{UffFunction, read_functions};
 }

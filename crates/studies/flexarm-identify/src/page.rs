@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use flexarm_draw::{CurveLook, LinePlot, Panel, PlotCurve};
 
-use super::{Compared, EncoderFigures, Identification, ResponseCurves};
+use super::{Compared, EncoderFigures, FoundFrame, FoundPoint, Identification, ResponseCurves};
 use flexarm_run::html_page::{ENDING, opening, warnings};
 use flexarm_settings::written::markup;
 
@@ -25,9 +25,18 @@ pub(super) fn html(answer: &Identification) -> String {
     page += &headline(answer);
     page += &warnings("", &answer.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
     page += &parameters(answer);
-    if !answer.frames.is_empty() {
+    if !(answer.instruments.is_empty() && answer.targets.is_empty()) {
         page += "<h2>Instruments and targets</h2>\n";
-        answer.frames.iter().for_each(|text| page += &format!("<p>{}</p>\n", markup(text)));
+    }
+    let three = |v: [f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(", ");
+    for FoundFrame { name, xyz, rpy } in &answer.instruments {
+        let (at, turn) = (three(xyz.map(|x| 1e3 * x), 3), three(rpy.map(f64::to_degrees), 4));
+        let name = markup(name);
+        let _ = writeln!(page, "<p>Instrument {name}: {at} mm in the world; roll, pitch, yaw {turn} degrees</p>");
+    }
+    for FoundPoint { name, link, xyz } in &answer.targets {
+        let (name, at, link) = (markup(name), three(xyz.map(|x| 1e3 * x), 3), markup(link));
+        let _ = writeln!(page, "<p>Target {name}: {at} mm in the axes of {link}</p>");
     }
     page += &suspicious(answer);
     let mut drawn: Vec<(&str, &str)> = Vec::new();
@@ -94,9 +103,8 @@ fn parameters(answer: &Identification) -> String {
         );
     }
     out += "</table>\n";
-    for combination in &answer.untold {
-        let parts: Vec<String> = combination.iter().map(|w| format!("{:+.2} {}", w.weight, markup(&w.name))).collect();
-        let _ = writeln!(out, "<p class=\"note\">Not determined by the readings: {}</p>", parts.join(" "));
+    for text in &answer.combinations {
+        let _ = writeln!(out, "<p class=\"note\">{}</p>", markup(text));
     }
     out
 }

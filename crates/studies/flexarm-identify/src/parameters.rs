@@ -1,28 +1,9 @@
 //! Identifiable parameters of a robot file: their names, their effect on the arm, and their places
-//! in the file.
-//!
-//! | name | meaning |
-//! | --- | --- |
-//! | `drive.JOINT.gearbox.stiffness` | single stiffness of a gearbox (N m/rad; N/m if it slides) |
-//! | `drive.JOINT.gearbox.stiffness[k]` | one of three or six stiffnesses, from 0 |
-//! | `drive.JOINT.gearbox.seat[k]` | stiffness of the housing across the axis, before the joint |
-//! | `link.LINK.stiffness_factor` | factor on the whole stiffness of a flexible link |
-//! | `link.LINK.stiffness_factors[k]` | factor on one of six directions of a lumped link, from 0 |
-//! | `link.LINK.stiffness[i][j]` | entry of a two-part link's symmetric 6x6 (N/m, N, N m/rad) |
-//! | `tcp.x`, `.y`, `.z`, `.rx`, `.ry`, `.rz` | shift and rotation of the tool, own axes (m, rad) |
-//! | `mounting.stiffness[k]` | one of six springs under the base, from 0 |
-//! | `drive.JOINT.gearbox.damping` | damping of a gearbox, if the file has it (N m s/rad, N s/m) |
-//! | `drive.JOINT.gearbox.damping[k]` | one of three or six dampers, from 0 |
-//! | `link.LINK.damping` | modal ratio, `stiffness_beta` (s), or a factor on `rayleigh` |
-//! | `payload.mass` | mass of the payload (kg), its centre of mass fixed |
-//! | `drive.JOINT.gearbox.guide.AXIS.compliance[k]` | tilt of a telescopic joint about x, y or z |
-//! | `drive.JOINT.gearbox.guide.AXIS.play.gap` | its clearance (m); also `centre`, `width` (N m) |
-//! | `joint.JOINT.x`, `.y`, `.z`, `.yaw`, `.pitch`, `.roll` | shift and rotation of a joint frame |
-//! | `joint.JOINT.zero` | zero of a joint (rad; m if it slides) |
+//! in the file. `docs/identify.md` lists the names.
 
-use crate::estimation::{Effect, NominalArm, Parameter, SpringPart};
+use crate::estimation::{Effect, LinkPart, NominalArm, Parameter, SpringPart};
 use flexarm_flexlink::{GearStiffness, SEAT};
-use flexarm_kinematics::{JointMotion, SpatialInertia};
+use flexarm_kinematics::{JointMotion, LinkInertia, SpatialInertia};
 use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
@@ -63,6 +44,11 @@ pub enum ParameterLocation {
     Mounting { entry: usize },
     /// `payload.mass`.
     Payload,
+    /// Mass of a link: of its `[[flexible_link]]`, or of its `[[inertial]]`.
+    Mass { link: String, flexible: bool },
+    /// `[[inertial]]` of the link: a coordinate of the centre of mass, which is `com` if the file has
+    /// none.
+    Com { link: String, axis: usize, com: Vector3<f64> },
     /// `[[drive]]` of the joint: number of its guide.
     Guide { joint: String, axis: char, term: GuideTerm },
     /// `[[calibration]]` of the joint: its zero, or a twist of its frame; `axis` is that of the joint.
@@ -98,11 +84,59 @@ pub(crate) fn candidates(robot: &Robot, arm: &Arm) -> Vec<Candidate> {
     if let Some(frame) = arm.model.frame(PAYLOAD_LINK) {
         let mass = robot.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass);
         let per_kg = SpatialInertia::from_com(1.0, &Vector3::zeros(), &Matrix3::zeros()).at_parent(&frame.X_BF);
-        let effect = Effect::Mass { body: frame.body, per_kg };
+        let effect = Effect::Mass(vec![(frame.body, per_kg)]);
         found.push(Candidate::new("payload.mass".into(), "kg", mass, effect, ParameterLocation::Payload));
     }
+    found.extend(robot.rigid.links.iter().filter(|link| link.name != PAYLOAD_LINK).flat_map(|link| {
+        let inertia = link.inertia.filter(|inertia| inertia.mass > 0.0);
+        inertia.map_or(Vec::new(), |inertia| mass_parameters(&link.name, inertia, robot, arm))
+    }));
     found.extend(tool_parameters());
     found.extend(frame_parameters(arm));
+    found
+}
+
+/// Usual error of a link's mass, and of its centre of mass over the radius of gyration about the
+/// link's origin.
+const INERTIAL: f64 = 0.2;
+
+/// Returns mass and centre of mass of a link that moves; of a flexible link the mass, if it is a
+/// lumped beam.
+fn mass_parameters(link: &str, inertia: LinkInertia, robot: &Robot, arm: &Arm) -> Vec<Candidate> {
+    let flexible = robot.flexible_links.iter().find(|own| own.flexible.link == link);
+    let frame = arm.model.frame(link).filter(|_| flexible.is_none_or(|own| own.beam.is_some()));
+    let Some(frame) = frame else { return Vec::new() };
+    let parts = match arm.spans.iter().position(|span| span.link == link && flexible.is_some()) {
+        None => vec![LinkPart { body: frame.body, X_BL: frame.X_BF, inertia }],
+        Some(number) => {
+            let Some(chain) = &arm.spans[number].lumped else { return Vec::new() };
+            let springs = arm.owners.iter().zip(arm.model.elastic()).filter(|(own, _)| **own == Owner::Link(number));
+            // The frames of the parts behind the springs are at the springs.
+            let behind = springs.zip(&chain.joints).map(|((_, own), joint)| (own.body, joint.X_LS.inverse()));
+            let places = std::iter::once((frame.body, frame.X_BF)).chain(behind);
+            let all = places.zip(&chain.parts).map(|((body, X_BL), part)| {
+                let inertia = LinkInertia { mass: part.mass, com: part.com, inertia_com: part.inertia };
+                LinkPart { body, X_BL, inertia }
+            });
+            all.collect()
+        }
+    };
+    if parts.iter().all(|part| part.body == 0) {
+        return Vec::new();
+    }
+    let written = ParameterLocation::Mass { link: link.to_owned(), flexible: flexible.is_some() };
+    let effect = |axis, size| Effect::Link { parts: parts.clone(), axis, size };
+    let mass = effect(None, INERTIAL * inertia.mass);
+    let mut found = vec![Candidate::new(format!("link.{link}.mass"), "kg", inertia.mass, mass, written)];
+    if flexible.is_none() {
+        let moment = inertia.inertia_com.symmetric_eigenvalues().max();
+        let size = INERTIAL * (inertia.com.norm_squared() + moment / inertia.mass).sqrt();
+        found.extend(["x", "y", "z"].into_iter().enumerate().map(|(axis, name)| {
+            let written = ParameterLocation::Com { link: link.to_owned(), axis, com: inertia.com };
+            let effect = effect(Some(axis), size);
+            Candidate::new(format!("link.{link}.com.{name}"), "m", inertia.com[axis], effect, written)
+        }));
+    }
     found
 }
 
@@ -230,38 +264,30 @@ fn frame_parameters(arm: &Arm) -> Vec<Candidate> {
     found
 }
 
-/// Reason why parameters cannot have one value.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum TieError {
-    #[error("no parameter that is fitted matches it")]
-    NoMatch,
-    #[error("{own} = {own_value}, {other} = {other_value}: give them one value in the robot file")]
-    Values { own: String, own_value: f64, other: String, other_value: f64 },
-    #[error("{0} and {1} cannot have one value: expected stiffnesses, or one number of guides")]
-    Laws(String, String),
-}
-
 impl Candidate {
     /// Adds another parameter that has the same value.
     ///
     /// # Errors
-    /// [`TieError`] if the two have different laws or initial values.
-    pub(crate) fn tie(&mut self, other: &Self) -> Result<(), TieError> {
+    /// A message if the two have different laws or initial values.
+    pub(crate) fn tie(&mut self, other: &Self) -> Result<(), String> {
         let (own, others) = (&mut self.parameter, &other.parameter);
         if (own.initial - others.initial).abs() > 1e-9 * own.initial.abs() {
-            return Err(TieError::Values {
-                own: own.name.clone(),
-                own_value: own.initial,
-                other: others.name.clone(),
-                other_value: others.initial,
-            });
+            let Parameter { name, initial, .. } = others;
+            let text =
+                format!("{} = {}, {name} = {initial}: give them one value in the robot file", own.name, own.initial);
+            return Err(text);
         }
         match (&mut own.effect, &others.effect) {
             (Effect::Stiffness(places), Effect::Stiffness(more)) => places.extend(more),
             (Effect::Guide { springs, term, .. }, Effect::Guide { springs: more, term: same, .. }) if term == same => {
                 springs.extend(more);
             }
-            _ => return Err(TieError::Laws(own.name.clone(), others.name.clone())),
+            _ => {
+                let (own, other) = (&own.name, &others.name);
+                return Err(format!(
+                    "{own} and {other} cannot have one value: expected stiffnesses, or one number of guides"
+                ));
+            }
         }
         self.tied.push(other.written.clone());
         Ok(())
@@ -423,9 +449,15 @@ pub fn asks_for(pattern: &str, name: &str) -> bool {
         _ if is_entry(name) => pattern.contains("]["),
         _ if is_tool(name) => pattern.starts_with("tcp"),
         _ if is_frame(name) => pattern.starts_with(FRAME),
+        _ if is_inertial(name) => pattern.contains(".mass") || pattern.contains(".com"),
         _ => true,
     };
     by_name && fits(pattern, name)
+}
+
+/// Whether the name is that of the mass or the centre of mass of a link.
+fn is_inertial(name: &str) -> bool {
+    name.starts_with("link.") && (name.ends_with(".mass") || name.contains(".com."))
 }
 
 /// Whether the name is that of an entry of a link's matrix.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::estimation::{
-    Candidate, Component, LoadCase, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind, Row, plan,
+    Component, LoadCase, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind, Row, plan,
 };
 use flexarm_files::{NumberTable, check_apart, check_free, write_all};
 use flexarm_kinematics::Wrench;
@@ -11,14 +11,16 @@ use flexarm_settings::written::csv_field;
 use nalgebra::Vector3;
 use serde::Serialize;
 
+use super::error::refused;
 use super::plan_load::Efforts;
-use super::{IdentifyFileError, joints_of, nominal};
+use super::{joints_of, nominal};
 use flexarm_run::Arm;
 use flexarm_run::Error;
 use flexarm_run::Finding;
 use flexarm_run::Modelling;
 use flexarm_run::Robot;
 use flexarm_run::caveat::Use;
+use flexarm_run::caveat::size::halton;
 use flexarm_run::caveat::warnings;
 
 /// Number of candidate poses if none are given.
@@ -29,7 +31,7 @@ const WITHOUT_LIMITS: f64 = std::f64::consts::PI;
 const RANGE: f64 = 0.9;
 
 /// Arguments of [`plan_measurements`].
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct PlanRequest {
     /// Modelling of links and drives.
     pub modelling: Modelling,
@@ -65,20 +67,7 @@ pub struct PlanRequest {
 impl PlanRequest {
     /// Returns a request for a number of readings, measured to 0.03 mm.
     pub fn new(count: usize) -> Self {
-        Self {
-            modelling: Modelling::default(),
-            fit: Vec::new(),
-            count,
-            forces: Vec::new(),
-            levers: Vec::new(),
-            points: Vec::new(),
-            directions: Vec::new(),
-            std_m: 3e-5,
-            poses: None,
-            work: None,
-            output: None,
-            overwrite: false,
-        }
+        Self { count, std_m: 3e-5, ..Self::default() }
     }
 }
 
@@ -212,21 +201,21 @@ pub struct ExpectedParameter {
 /// robot's parameters.
 ///
 /// # Errors
-/// [`Error::File`] for a table without valid poses, [`IdentifyFileError`] if there is nothing to
+/// [`Error::File`] for a table without valid poses, [`super::IdentifyFileError`] if there is nothing to
 /// identify, [`Error::Taken`], [`Error::Write`].
 pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<MeasurementPlan, Error> {
     let arm = robot.model(&request.modelling)?;
     let (joints, slides): (Vec<String>, Vec<bool>) = joints_of(&arm).into_iter().unzip();
     if let Some(text) = request.fault() {
-        return Err(IdentifyFileError::Fit(text).into());
+        return Err(refused(text));
     }
     if arm.springs.is_empty() {
         let text = "the robot has no flexible link and no elastic drive: loads do not displace it, so there is nothing to \
                     plan; add [[flexible_link]] or [[drive]] entries with initial values";
-        return Err(IdentifyFileError::Fit(text.into()).into());
+        return Err(refused(text));
     }
     let targets = request.targets()?;
-    let fitted = super::chosen(&arm, &nothing_measured(), &request.fit)?;
+    let fitted = super::chosen(&arm, &super::MeasurementInput::default(), &request.fit)?;
     let fitted: Vec<Parameter> = fitted.into_iter().map(|candidate| candidate.parameter).collect();
     let poses = match &request.poses {
         Some(path) => poses_of(path, &joints)?,
@@ -240,8 +229,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     let request = &request;
     let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
     let pairs = allowed(&efforts, poses.len(), &request.setups(), if chosen_forces { 0 } else { request.count });
-    let candidates: Vec<Candidate> =
-        pairs.iter().map(|(pose, setup)| Candidate(reading(&poses[*pose], setup))).collect();
+    let candidates: Vec<Reading> = pairs.iter().map(|(pose, setup)| reading(&poses[*pose], setup)).collect();
     let purpose: Vec<Reading> = match &request.work {
         Some(path) => {
             let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
@@ -250,7 +238,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         None => Vec::new(),
     };
     let nominal = nominal(&arm);
-    let options = PlanOptions { count: request.count, purpose, repeat: false };
+    let options = PlanOptions { count: request.count, purpose };
     let [best, first] = plans(&nominal, &fitted, &candidates, &options)?;
     let mut caveats = arm.caveats(Use::Any);
     let over = best.chosen.iter().filter_map(|k| efforts.excess(pairs[*k].0, pairs[*k].1.force, pairs[*k].1.at));
@@ -301,16 +289,16 @@ fn load_caveat(over: &[(&str, f64)], readings: usize) -> Option<Finding> {
 fn plans(
     nominal: &NominalArm,
     fitted: &[Parameter],
-    candidates: &[Candidate],
+    candidates: &[Reading],
     options: &PlanOptions,
 ) -> Result<[Plan; 2], Error> {
-    let plan_of = |candidates: &[Candidate]| {
-        plan(nominal, fitted, candidates, options).map_err(|error| IdentifyFileError::Fit(error.to_string()))
+    let plan_of = |candidates: &[Reading]| {
+        plan(nominal, fitted, candidates, options).map_err(|error| refused(error.to_string()))
     };
     let best = plan_of(candidates)?;
     if best.chosen.len() < options.count {
         let text = format!("only {} of {} readings are possible at these poses", best.chosen.len(), options.count);
-        return Err(IdentifyFileError::Fit(text).into());
+        return Err(refused(text));
     }
     Ok([best, plan_of(&candidates[..options.count.min(candidates.len())])?])
 }
@@ -321,25 +309,6 @@ fn expected((parameter, std): (&Parameter, &f64)) -> ExpectedParameter {
         unit: parameter.unit.clone(),
         initial: parameter.initial,
         std: parameter.deviation(0.0, *std),
-    }
-}
-
-fn nothing_measured() -> super::MeasurementInput {
-    super::MeasurementInput {
-        measurements: crate::estimation::Measurements::default(),
-        recordings: Vec::new(),
-        instruments: Vec::new(),
-        targets: Vec::new(),
-        fit: Vec::new(),
-        keep: Vec::new(),
-        tie: Vec::new(),
-        uncertainty: None,
-        known: Vec::new(),
-        loss: crate::estimation::Loss::Square,
-        empty_rows: 0,
-        length: "m",
-        angle_rad: 1.0,
-        length_m: 1.0,
     }
 }
 
@@ -358,7 +327,6 @@ fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
 
 /// Poses spread over the joint ranges as Halton points.
 fn spread_poses(arm: &Arm) -> Vec<Vec<f64>> {
-    const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
     let model = &arm.model;
     let ranges: Vec<(f64, f64)> = model.coordinates()[..model.n_actuated()]
         .iter()
@@ -369,19 +337,7 @@ fn spread_poses(arm: &Arm) -> Vec<Vec<f64>> {
             (middle - half, middle + half)
         })
         .collect();
-    let radical = |mut k: u32, base: u32| {
-        let (mut value, mut part) = (0.0, 1.0 / f64::from(base));
-        while k > 0 {
-            value += part * f64::from(k % base);
-            k /= base;
-            part /= f64::from(base);
-        }
-        value
-    };
-    let pose = |k: u32| {
-        let each = ranges.iter().enumerate().map(|(j, (a, b))| a + (b - a) * radical(k + 20, PRIMES[j % PRIMES.len()]));
-        each.collect()
-    };
+    let pose = |k: u32| ranges.iter().enumerate().map(|(j, (a, b))| a + (b - a) * halton(k + 20, j)).collect();
     (1..=CANDIDATES as u32).map(pose).collect()
 }
 
@@ -411,17 +367,17 @@ fn poses_of(path: &Path, joints: &[String]) -> Result<Vec<Vec<f64>>, Error> {
 
 fn planned(
     nominal: &NominalArm,
-    candidates: &[Candidate],
+    candidates: &[Reading],
     best: &Plan,
     pairs: &[(usize, Setup)],
 ) -> Result<Vec<PlannedReading>, Error> {
     let one = |number: &usize| {
         let setup = pairs[*number].1;
-        let q = candidates[*number].0.q.clone();
+        let q = candidates[*number].q.clone();
         let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
         let measurements = crate::estimation::Measurements { readings: vec![reading], ..Default::default() };
         let arm = crate::estimation::MeasuredArm { nominal, parameters: &[], measurements: &measurements };
-        let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| IdentifyFileError::Fit(e.to_string()))?;
+        let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| refused(e.to_string()))?;
         let Setup { force, at, point, direction } = setup;
         Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })
     };

@@ -76,6 +76,9 @@ enum Direction {
     Vector([f64; 3]),
 }
 
+/// Message about a direction that is none.
+const NO_DIRECTION: &str = "expected a direction: \"x\", \"-y\" and so on, or three numbers that are not all zero";
+
 impl Direction {
     fn vector(&self) -> Option<Vector3<f64>> {
         let v = match self {
@@ -241,12 +244,7 @@ impl Reader<'_> {
                     self.error(e.file.span(), format!("a table needs a direction, such as {what}_direction = \"x\""))
                 );
             };
-            let vector = direction.get_ref().vector().ok_or_else(|| {
-                self.error(
-                    direction.span(),
-                    "expected a direction: \"x\", \"-y\" and so on, or three numbers that are not all zero",
-                )
-            })?;
+            let vector = direction.get_ref().vector().ok_or_else(|| self.error(direction.span(), NO_DIRECTION))?;
             Ok((node.as_ref().map(|node| node.get_ref().clone()), vector))
         };
         Ok(Curve {
@@ -270,7 +268,7 @@ impl Reader<'_> {
         if let Some(node) = given {
             return Err(self.error(node.span(), "a universal file contains nodes and directions: remove them here"));
         }
-        let functions = read_functions(&bytes).map_err(|error| fail(error.to_string()))?;
+        let functions = read_functions(&bytes).map_err(fail)?;
         let one = |function: &UffFunction| {
             let name = format!("{} line {}", e.file.get_ref().display(), function.line);
             let (answer, factor) = match &e.unit {
@@ -326,12 +324,7 @@ impl Reader<'_> {
         }
         let q = self.joints(&e.joints)?;
         let probe = |(name, direction): (&String, &Direction)| {
-            let vector = direction.vector().ok_or_else(|| {
-                self.error(
-                    e.directions.span(),
-                    "expected a direction: \"x\", \"-y\" and so on, or three numbers that are not all zero",
-                )
-            })?;
+            let vector = direction.vector().ok_or_else(|| self.error(e.directions.span(), NO_DIRECTION))?;
             self.probe(nodes, &(Some(name.clone()), vector), &q, &span)
         };
         let probes = names.iter().zip(directions).map(probe).collect::<Result<Vec<Probe>, Error>>()?;

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::estimation::ParameterEstimate;
+use crate::estimation::FittedParameter;
 use crate::estimation::parameter::displacement;
 use flexarm_kinematics::Pose;
 use flexarm_run::Calibration;
@@ -12,26 +12,6 @@ use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, Tab
 
 use super::parameters::ParameterLocation;
 
-/// Reason why identified values cannot be written to a robot file.
-#[derive(Debug, thiserror::Error)]
-#[doc(hidden)]
-pub enum RewriteError {
-    #[error("{0}")]
-    Syntax(#[from] toml_edit::TomlError),
-    #[error("there is no [[{list}]] with {key} = {name:?}")]
-    NoTable { list: &'static str, key: &'static str, name: String },
-    #[error("there is no {0}")]
-    Missing(&'static str),
-    #[error("the drive of joint {joint:?} has no gearbox.{key}")]
-    NoGearbox { joint: String, key: &'static str },
-    #[error("link {link:?} has no stiffness_factors[{entry}]")]
-    NoFactor { link: String, entry: usize },
-    #[error("{list} has no entry {entry}")]
-    NoEntry { list: String, entry: usize },
-    #[error("{what} is not {expected}")]
-    Form { what: String, expected: &'static str },
-}
-
 /// Returns the text of the robot file with the identified values; each is listed in a comment with
 /// its standard deviation.
 ///
@@ -39,89 +19,111 @@ pub enum RewriteError {
 /// * `calibrations`: corrections of joint frames in the old file.
 /// * `home`: folder of the old file; `to`: folder of the new file. Relative paths in the file are
 ///   rewritten if they differ.
+///
+/// # Errors
+/// A message if the file has no place for a value.
 #[doc(hidden)]
 pub fn rewritten(
     text: &str,
-    found: &[(ParameterEstimate, ParameterLocation)],
+    found: &[(FittedParameter, ParameterLocation)],
     tool: (&str, &Pose),
     calibrations: &[Calibration],
     home: &Path,
     to: &Path,
-) -> Result<String, RewriteError> {
-    let mut file: DocumentMut = text.parse()?;
+) -> Result<String, String> {
+    let mut file: DocumentMut = text.parse().map_err(|error: toml_edit::TomlError| error.to_string())?;
     for (parameter, written) in found {
-        put(&mut file, parameter, written)?;
+        put(&mut file, parameter, written)
+            .ok_or_else(|| format!("there is no place for {} in the robot file", parameter.name))?;
     }
-    put_tool(&mut file, found, tool)?;
-    put_frames(&mut file, found, calibrations)?;
+    put_tool(&mut file, found, tool).ok_or("tcp is not a table")?;
+    put_frames(&mut file, found, calibrations).ok_or("calibration is not a list of tables")?;
     if home != to {
         moved_paths(&mut file, home, to);
     }
     Ok(comments(found) + &file.to_string())
 }
 
-/// Writes one value to its place; the pose of the tool is left to [`put_tool`].
-fn put(file: &mut DocumentMut, found: &ParameterEstimate, written: &ParameterLocation) -> Result<(), RewriteError> {
+/// Writes one value to its place; the pose of the tool and the joint frames are left to [`put_tool`]
+/// and [`put_frames`].
+fn put(file: &mut DocumentMut, found: &FittedParameter, written: &ParameterLocation) -> Option<()> {
     let number = exact(found.value);
     match written {
         ParameterLocation::Gearbox { joint, entry } => {
-            let missing = || RewriteError::NoGearbox { joint: joint.clone(), key: "stiffness" };
             let drive = named(file, "drive", "joint", joint)?;
-            let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut).ok_or_else(missing)?;
-            put_stiffness(gearbox.get_mut("stiffness").ok_or_else(missing)?, *entry, found)?;
-            gearbox.insert("identified", toml_edit::value(true));
-            Ok(())
+            put_number(inside(drive, &["gearbox", "stiffness"])?, *entry, found)?;
+            inside(drive, &["gearbox"])?.as_table_like_mut()?.insert("identified", toml_edit::value(true));
         }
         ParameterLocation::Seat { joint, entry } => {
-            let gearbox = named(file, "drive", "joint", joint)?.get_mut("gearbox").and_then(Item::as_table_like_mut);
-            let seat = gearbox.and_then(|gearbox| gearbox.get_mut("seat"));
-            let missing = || RewriteError::NoGearbox { joint: joint.clone(), key: "seat" };
-            put_stiffness(seat.ok_or_else(missing)?, Some(*entry), found)
+            let drive = named(file, "drive", "joint", joint)?;
+            put_number(inside(drive, &["gearbox", "seat"])?, Some(*entry), found)?;
         }
         ParameterLocation::GearboxDamping { joint, entry } => {
-            put_gear_damping(named(file, "drive", "joint", joint)?, joint, *entry, found)
+            let drive = named(file, "drive", "joint", joint)?;
+            put_number(inside(drive, &["gearbox", "damping"])?, *entry, found)?;
+        }
+        ParameterLocation::Guide { joint, axis, term } => {
+            let tilt = ["gearbox", "guide", &axis.to_string()];
+            let tilt = inside(named(file, "drive", "joint", joint)?, &tilt)?.as_table_like_mut()?;
+            let key = match term {
+                GuideTerm::Compliance(k) => return put_number(tilt.get_mut("compliance")?, Some(*k), found),
+                GuideTerm::Gap => "gap",
+                GuideTerm::Centre => "centre",
+                GuideTerm::Width => "width",
+            };
+            set(tilt.get_mut("play")?.as_table_like_mut()?, key, number);
         }
         ParameterLocation::Link { link } => {
             named(file, "flexible_link", "link", link)?.insert("stiffness_factor", toml_edit::value(number));
-            Ok(())
         }
         ParameterLocation::LinkDirection { link, entry } => {
-            put_link_direction(named(file, "flexible_link", "link", link)?, *entry, number)
-                .ok_or_else(|| RewriteError::NoFactor { link: link.clone(), entry: *entry })
+            let link = named(file, "flexible_link", "link", link)?;
+            if link.get("stiffness_factors").is_none() {
+                link.insert("stiffness_factors", toml_edit::value([1.0; 6].into_iter().collect::<Array>()));
+            }
+            put_number(link.get_mut("stiffness_factors")?, Some(*entry), found)?;
         }
         ParameterLocation::LinkDamping { link } => {
-            put_link_damping(named(file, "flexible_link", "link", link)?, link, found)
+            let link = named(file, "flexible_link", "link", link)?;
+            let damping = link.get_mut("damping").and_then(Item::as_table_like_mut);
+            match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
+                Some(value) => put_number(value, None, found)?,
+                None => {
+                    let modal = [("modal", Value::from(number))].into_iter().collect::<InlineTable>();
+                    link.insert("damping", toml_edit::value(modal));
+                }
+            }
         }
         ParameterLocation::LinkEntry { link, row, column, K } => {
-            let entry = named(file, "flexible_link", "link", link)?;
-            put_entry(entry, (*row, *column), K, number).ok_or_else(|| RewriteError::Form {
-                what: format!("the stiffness of link {link:?}"),
-                expected: "a 6x6 matrix",
-            })
+            put_entry(named(file, "flexible_link", "link", link)?, (*row, *column), K, number)?;
         }
-        ParameterLocation::Tool { .. } | ParameterLocation::Frame { .. } => Ok(()),
-        ParameterLocation::Guide { joint, axis, term } => {
-            put_guide(named(file, "drive", "joint", joint)?, *axis, *term, number)
-                .ok_or_else(|| RewriteError::NoGearbox { joint: joint.clone(), key: "guide" })
-        }
+        ParameterLocation::Tool { .. } | ParameterLocation::Frame { .. } => {}
         ParameterLocation::Mounting { entry } => {
-            let mounting = file.get_mut("mounting").and_then(Item::as_table_like_mut);
-            let stiffness = mounting.and_then(|mounting| mounting.get_mut("stiffness"));
-            put_stiffness(stiffness.ok_or(RewriteError::Missing("mounting.stiffness"))?, Some(*entry), found)
+            put_number(inside(file.as_table_mut(), &["mounting", "stiffness"])?, Some(*entry), found)?;
         }
-        ParameterLocation::Payload => {
-            let payload = file.get_mut("payload").and_then(Item::as_table_like_mut);
-            payload.ok_or(RewriteError::Missing("payload"))?.insert("mass", toml_edit::value(number));
-            Ok(())
+        ParameterLocation::Payload => set(file.get_mut("payload")?.as_table_like_mut()?, "mass", number),
+        ParameterLocation::Mass { link, flexible: true } => {
+            set(named(file, "flexible_link", "link", link)?, "mass", number);
+        }
+        ParameterLocation::Mass { link, flexible: false } => {
+            set(entry_of(file, "inertial", "link", link)?, "mass", number);
+        }
+        ParameterLocation::Com { link, axis, com } => {
+            let entry = entry_of(file, "inertial", "link", link)?;
+            if entry.get("com").is_none() {
+                entry.insert("com", toml_edit::value(com.iter().copied().collect::<Array>()));
+            }
+            put_number(entry.get_mut("com")?, Some(*axis), found)?;
         }
     }
+    Some(())
 }
 
 /// Returns the header comment that lists the identified values.
-fn comments(found: &[(ParameterEstimate, ParameterLocation)]) -> String {
+fn comments(found: &[(FittedParameter, ParameterLocation)]) -> String {
     let mut out = String::from("# Identified by flexarm identify: value, standard deviation, previous value.\n");
     let mut last = "";
-    for (ParameterEstimate { name, unit, value, std, initial, identifiable, rigid, .. }, _) in found {
+    for (FittedParameter { name, unit, value, std, initial, identifiable, rigid, .. }, _) in found {
         // Tied parameters have several places.
         if std::mem::replace(&mut last, name) == name {
             continue;
@@ -165,77 +167,61 @@ fn rounded(value: f64, std: f64) -> f64 {
 }
 
 /// Returns the entry with a given name in an array of tables.
-fn named<'a>(
-    file: &'a mut DocumentMut,
-    list: &'static str,
-    key: &'static str,
-    name: &str,
-) -> Result<&'a mut dyn TableLike, RewriteError> {
-    let missing = || RewriteError::NoTable { list, key, name: name.to_owned() };
+fn named<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) -> Option<&'a mut dyn TableLike> {
     let is_it = |table: &dyn TableLike| table.get(key).and_then(Item::as_str) == Some(name);
-    match file.get_mut(list) {
-        Some(Item::ArrayOfTables(tables)) => tables
-            .iter_mut()
-            .find(|table| is_it(*table as &Table))
-            .map(|table| table as &mut dyn TableLike)
-            .ok_or_else(missing),
-        Some(Item::Value(Value::Array(values))) => values
-            .iter_mut()
-            .filter_map(Value::as_inline_table_mut)
-            .find(|table| is_it(*table as &toml_edit::InlineTable))
-            .map(|table| table as &mut dyn TableLike)
-            .ok_or_else(missing),
-        _ => Err(missing()),
+    match file.get_mut(list)? {
+        Item::ArrayOfTables(tables) => {
+            let found = tables.iter_mut().find(|table| is_it(*table as &Table));
+            found.map(|table| table as &mut dyn TableLike)
+        }
+        Item::Value(Value::Array(values)) => {
+            let found = values.iter_mut().filter_map(Value::as_inline_table_mut);
+            found.map(|table| table as &mut dyn TableLike).find(|table| is_it(*table))
+        }
+        _ => None,
     }
 }
 
-fn put_stiffness(item: &mut Item, entry: Option<usize>, found: &ParameterEstimate) -> Result<(), RewriteError> {
-    let what = || "gearbox.stiffness".to_owned();
-    let value =
-        item.as_value_mut().ok_or_else(|| RewriteError::Form { what: what(), expected: "a number or a list" })?;
+/// Returns the item at the end of a path of keys.
+fn inside<'a>(table: &'a mut dyn TableLike, keys: &[&str]) -> Option<&'a mut Item> {
+    let (first, rest) = keys.split_first()?;
+    let item = table.get_mut(first)?;
+    if rest.is_empty() { Some(item) } else { inside(item.as_table_like_mut()?, rest) }
+}
+
+/// Sets a number, or one of a list. Without an entry a list of several numbers or a matrix is scaled by
+/// the ratio of new to initial value.
+fn put_number(item: &mut Item, entry: Option<usize>, found: &FittedParameter) -> Option<()> {
     let number = exact(found.value);
-    match (value, entry) {
-        (Value::Array(list), Some(k)) => {
-            let old = list.get_mut(k).ok_or_else(|| RewriteError::NoEntry { list: what(), entry: k })?;
-            replace(old, number);
-        }
-        // Full matrix: scales every entry by the factor.
-        (Value::Array(rows), None) => {
-            for cell in rows.iter_mut().filter_map(Value::as_array_mut).flat_map(toml_edit::Array::iter_mut) {
-                let old = cell.as_float().or_else(|| cell.as_integer().map(|n| n as f64)).unwrap_or(0.0);
-                replace(cell, old * found.value);
-            }
-        }
+    match (item.as_value_mut()?, entry) {
+        (Value::Array(list), Some(k)) => replace(list.get_mut(k)?, number),
+        (Value::Array(list), None) if list.len() == 1 => replace(list.get_mut(0)?, number),
+        (Value::Array(list), None) => list.iter_mut().for_each(|value| scale(value, found.value / found.initial)),
         (value, _) => replace(value, number),
     }
-    Ok(())
-}
-
-/// Sets an entry of a link's `stiffness_factors`. A missing list is written as ones first.
-fn put_link_direction(link: &mut dyn TableLike, entry: usize, number: f64) -> Option<()> {
-    if link.get("stiffness_factors").is_none() {
-        let ones: Array = [1.0; 6].into_iter().collect();
-        link.insert("stiffness_factors", toml_edit::value(ones));
-    }
-    replace(link.get_mut("stiffness_factors").and_then(Item::as_array_mut)?.get_mut(entry)?, number);
     Some(())
 }
 
-/// Sets the damping of a link, as modal damping if it has none.
-fn put_link_damping(link: &mut dyn TableLike, name: &str, found: &ParameterEstimate) -> Result<(), RewriteError> {
-    let damping = link.get_mut("damping").and_then(Item::as_table_like_mut);
-    match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
-        Some(value) => {
-            let not_one = || RewriteError::Form { what: format!("the damping of link {name:?}"), expected: "a number" };
-            put_damping(value.as_value_mut().ok_or_else(not_one)?, found);
-        }
-        None => {
-            let mut modal = InlineTable::new();
-            modal.insert("modal", exact(found.value).into());
-            link.insert("damping", toml_edit::value(modal));
+/// Multiplies all numbers of a value by a factor.
+fn scale(value: &mut Value, factor: f64) {
+    match value {
+        Value::Array(list) => list.iter_mut().for_each(|value| scale(value, factor)),
+        value => {
+            if let Some(old) = value.as_float().or_else(|| value.as_integer().map(|n| n as f64)) {
+                replace(value, old * factor);
+            }
         }
     }
-    Ok(())
+}
+
+/// Sets the number of a key, which is new if the table does not have it.
+fn set(table: &mut dyn TableLike, key: &str, number: f64) {
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => replace(old, number),
+        None => {
+            table.insert(key, toml_edit::value(number));
+        }
+    }
 }
 
 /// Sets an entry of a link's `stiffness` and its symmetric counterpart. A missing `stiffness` is
@@ -258,9 +244,9 @@ fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, 
 /// Writes the pose of the tool, moved and rotated about its own axes by the identified values.
 fn put_tool(
     file: &mut DocumentMut,
-    found: &[(ParameterEstimate, ParameterLocation)],
+    found: &[(FittedParameter, ParameterLocation)],
     tool: (&str, &Pose),
-) -> Result<(), RewriteError> {
+) -> Option<()> {
     let mut shift = [0.0; 6];
     for (parameter, written) in found {
         if let ParameterLocation::Tool { axis } = written {
@@ -268,7 +254,7 @@ fn put_tool(
         }
     }
     if shift == [0.0; 6] {
-        return Ok(());
+        return Some(());
     }
     let part = |first: usize| Vector3::new(shift[first], shift[first + 1], shift[first + 2]);
     let X_LT = tool.1 * Pose::from_parts(Translation3::from(part(0)), Rotation3::new(part(3)));
@@ -276,23 +262,22 @@ fn put_tool(
         let link = [("link", Value::from(tool.0))].into_iter().collect::<InlineTable>();
         file.insert("tcp", toml_edit::value(link));
     }
-    let entry = file.get_mut("tcp").and_then(Item::as_table_like_mut);
-    let entry = entry.ok_or_else(|| RewriteError::Form { what: "tcp".into(), expected: "a table" })?;
+    let entry = file.get_mut("tcp")?.as_table_like_mut()?;
     let list = |values: [f64; 3]| values.map(exact).into_iter().collect::<Array>();
     entry.insert("xyz", toml_edit::value(list(X_LT.translation.vector.into())));
     if part(3) != Vector3::zeros() {
         let (roll, pitch, yaw) = X_LT.rotation.euler_angles();
         entry.insert("rpy", toml_edit::value(list([roll, pitch, yaw])));
     }
-    Ok(())
+    Some(())
 }
 
 /// Writes the corrections of joint frames: those of the old file followed by the identified ones.
 fn put_frames(
     file: &mut DocumentMut,
-    found: &[(ParameterEstimate, ParameterLocation)],
+    found: &[(FittedParameter, ParameterLocation)],
     calibrations: &[Calibration],
-) -> Result<(), RewriteError> {
+) -> Option<()> {
     let mut corrections: Vec<(Calibration, Pose)> = Vec::new();
     for (parameter, written) in found {
         let ParameterLocation::Frame { joint, twist, axis, zero } = written else { continue };
@@ -311,7 +296,7 @@ fn put_frames(
         }
     }
     for (Calibration { joint, frame, zero }, _) in corrections {
-        let entry = calibration_of(file, &joint)?;
+        let entry = entry_of(file, "calibration", "joint", &joint)?;
         let list = |values: [f64; 3]| values.map(exact).into_iter().collect::<Array>();
         let (roll, pitch, yaw) = frame.rotation.euler_angles();
         for (key, values) in [("xyz", frame.translation.vector.into()), ("rpy", [roll, pitch, yaw])] {
@@ -320,95 +305,24 @@ fn put_frames(
             }
         }
         if zero != 0.0 {
-            let zero = exact(zero);
-            match entry.get_mut("zero").and_then(Item::as_value_mut) {
-                Some(old) => replace(old, zero),
-                None => {
-                    entry.insert("zero", toml_edit::value(zero));
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Returns the `[[calibration]]` of a joint, a new one if the file has none.
-fn calibration_of<'a>(file: &'a mut DocumentMut, joint: &str) -> Result<&'a mut dyn TableLike, RewriteError> {
-    if named(file, "calibration", "joint", joint).is_err() {
-        let mut table = Table::new();
-        table.insert("joint", toml_edit::value(joint));
-        let list = file.entry("calibration").or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new()));
-        match list {
-            Item::ArrayOfTables(tables) => tables.push(table),
-            Item::Value(Value::Array(values)) => values.push(table.into_inline_table()),
-            _ => return Err(RewriteError::Form { what: "calibration".into(), expected: "a list of tables" }),
-        }
-    }
-    named(file, "calibration", "joint", joint)
-}
-
-/// Sets a number of the guide of a drive.
-fn put_guide(drive: &mut dyn TableLike, axis: char, term: GuideTerm, number: f64) -> Option<()> {
-    let gearbox = drive.get_mut("gearbox")?.as_table_like_mut()?;
-    let guide = gearbox.get_mut("guide")?.as_table_like_mut()?;
-    let tilt = guide.get_mut(&axis.to_string())?.as_table_like_mut()?;
-    let key = match term {
-        GuideTerm::Compliance(k) => {
-            replace(tilt.get_mut("compliance")?.as_array_mut()?.get_mut(k)?, number);
-            return Some(());
-        }
-        GuideTerm::Gap => "gap",
-        GuideTerm::Centre => "centre",
-        GuideTerm::Width => "width",
-    };
-    let play = tilt.get_mut("play")?.as_table_like_mut()?;
-    match play.get_mut(key).and_then(Item::as_value_mut) {
-        Some(old) => replace(old, number),
-        None => {
-            play.insert(key, toml_edit::value(number));
+            set(entry, "zero", exact(zero));
         }
     }
     Some(())
 }
 
-/// Sets the damping of a gearbox, or one entry of it.
-fn put_gear_damping(
-    drive: &mut dyn TableLike,
-    joint: &str,
-    entry: Option<usize>,
-    found: &ParameterEstimate,
-) -> Result<(), RewriteError> {
-    let gearbox = drive.get_mut("gearbox").and_then(Item::as_table_like_mut);
-    let damping = gearbox.and_then(|gearbox| gearbox.get_mut("damping")).and_then(Item::as_value_mut);
-    let missing = || RewriteError::NoGearbox { joint: joint.to_owned(), key: "damping" };
-    let damping = damping.ok_or_else(missing)?;
-    match (damping, entry) {
-        (Value::Array(list), Some(k)) => {
-            let missing = || RewriteError::NoEntry { list: format!("gearbox.damping of {joint:?}"), entry: k };
-            let old = list.get_mut(k).ok_or_else(missing)?;
-            replace(old, exact(found.value));
+/// Returns the entry with a given name in an array of tables, a new one if the file has none.
+fn entry_of<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) -> Option<&'a mut dyn TableLike> {
+    if named(file, list, key, name).is_none() {
+        let mut table = Table::new();
+        table.insert(key, toml_edit::value(name));
+        match file.entry(list).or_insert_with(|| Item::ArrayOfTables(ArrayOfTables::new())) {
+            Item::ArrayOfTables(tables) => tables.push(table),
+            Item::Value(Value::Array(values)) => values.push(table.into_inline_table()),
+            _ => return None,
         }
-        (damping, _) => put_damping(damping, found),
     }
-    Ok(())
-}
-
-/// Sets a number to the new value; scales the entries of a longer list by the ratio of new to
-/// initial.
-fn put_damping(item: &mut Value, found: &ParameterEstimate) {
-    let factor = found.value / found.initial;
-    match item {
-        Value::Array(list) if list.len() == 1 => {
-            list.iter_mut().for_each(|cell| replace(cell, exact(found.value)));
-        }
-        Value::Array(list) => {
-            for cell in list.iter_mut() {
-                let old = cell.as_float().or_else(|| cell.as_integer().map(|n| n as f64)).unwrap_or(0.0);
-                replace(cell, old * factor);
-            }
-        }
-        number => replace(number, exact(found.value)),
-    }
+    named(file, list, key, name)
 }
 
 /// Replaces a number and keeps the spaces and comments around it.

@@ -33,36 +33,8 @@ pub struct UffFunction {
     pub values: Vec<(f64, Complex<f64>)>,
 }
 
-/// Reason why a file cannot be read, with the line.
-#[derive(Debug, thiserror::Error)]
-#[doc(hidden)]
-pub enum UffError {
-    #[error("this is not a universal file: it has no dataset between lines of -1")]
-    NotUniversal,
-    #[error("the file has no frequency response (dataset 58 with function type 4)")]
-    NoResponse,
-    #[error("line {line}: the file ends, expected {expected}")]
-    Ends { line: usize, expected: &'static str },
-    #[error("line {line}: expected {expected}, found {found:?}")]
-    Unexpected { line: usize, expected: &'static str, found: String },
-    #[error("line {line}: expected `58b`, byte order (1 or 2), number format (2), lines and bytes; found {found:?}")]
-    Binary { line: usize, found: String },
-    #[error("line {line}: the number of values is {count}, expected a whole number up to {MAX}")]
-    Count { line: usize, count: f64 },
-    #[error("line {line}: form {form} of values is not known; use 2, 4, 5 or 6")]
-    Form { line: usize, form: i64 },
-    #[error("line {line}: found {found} of the {wanted} values announced in line {head}")]
-    Short { line: usize, found: usize, wanted: usize, head: usize },
-    #[error(
-        "line {line}: {wanted} numbers of {size} bytes are announced; the dataset has {dataset} bytes, the file {file}"
-    )]
-    Bytes { line: usize, wanted: usize, size: usize, dataset: usize, file: usize },
-    #[error("line {line}: a value of this function is not finite")]
-    NotFinite { line: usize },
-}
-
 /// Reads all frequency responses of a file.
-pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, UffError> {
+pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
     let mut reader = Lines { bytes, at: 0, line: 0 };
     let (mut found, mut per_si, mut sets) = (Vec::new(), None, 0);
     while let Some(line) = reader.next() {
@@ -77,8 +49,12 @@ pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, UffError> {
             Some("58") => found.extend(function(&mut reader, start, None, per_si)?),
             Some("58b") => {
                 let numbers: Vec<&str> = words.collect();
-                let binary =
-                    Binary::of(&numbers).ok_or_else(|| UffError::Binary { line: start, found: kind.clone() })?;
+                let binary = Binary::of(&numbers).ok_or_else(|| {
+                    format!(
+                        "line {start}: expected `58b`, byte order (1 or 2), number format (2), lines and bytes; found \
+                         {kind:?}"
+                    )
+                })?;
                 found.extend(function(&mut reader, start, Some(binary), per_si)?);
             }
             Some("164") => per_si = Some(units(&mut reader)?),
@@ -92,8 +68,8 @@ pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, UffError> {
         }
     }
     match (sets, found.is_empty()) {
-        (0, _) => Err(UffError::NotUniversal),
-        (_, true) => Err(UffError::NoResponse),
+        (0, _) => Err("this is not a universal file: it has no dataset between lines of -1".into()),
+        (_, true) => Err("the file has no frequency response (dataset 58 with function type 4)".into()),
         _ => Ok(found),
     }
 }
@@ -116,14 +92,14 @@ impl Lines<'_> {
         )
     }
 
-    fn expect(&mut self, expected: &'static str) -> Result<String, UffError> {
+    fn expect(&mut self, expected: &'static str) -> Result<String, String> {
         let line = self.line + 1;
-        self.next().ok_or(UffError::Ends { line, expected })
+        self.next().ok_or_else(|| format!("line {line}: the file ends, expected {expected}"))
     }
 
     /// Returns the error for the line read last, or for a word of it.
-    fn unexpected(&self, expected: &'static str, found: String) -> UffError {
-        UffError::Unexpected { line: self.line, expected, found }
+    fn unexpected(&self, expected: &'static str, found: String) -> String {
+        format!("line {}: expected {expected}, found {found:?}", self.line)
     }
 }
 
@@ -143,7 +119,7 @@ impl Binary {
 }
 
 /// Reads the factors from SI to the units of the file: length, force.
-fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], UffError> {
+fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], String> {
     reader.expect("the code of the units")?;
     let line = reader.expect("factors of the units")?;
     let factors: Option<Vec<f64>> = line.split_whitespace().map(number).collect();
@@ -175,7 +151,7 @@ struct ValueForm {
 }
 
 impl ValueForm {
-    fn read(reader: &mut Lines<'_>) -> Result<Self, UffError> {
+    fn read(reader: &mut Lines<'_>) -> Result<Self, String> {
         let text = reader.expect("form of the values")?;
         let line = reader.line;
         let words: Vec<Option<f64>> = text.split_whitespace().map(number).collect();
@@ -186,7 +162,7 @@ impl ValueForm {
             return Err(reader.unexpected("form, number and spacing of the values", text));
         };
         if !(0.0..=MAX as f64).contains(&count) || count.fract() != 0.0 {
-            return Err(UffError::Count { line, count });
+            return Err(format!("line {line}: the number of values is {count}, expected a whole number up to {MAX}"));
         }
         let even = (spacing == 1.0).then_some((first, step));
         Ok(Self { line, code: form as i64, count: count as usize, even })
@@ -211,7 +187,7 @@ fn function(
     start: usize,
     binary: Option<Binary>,
     per_si: Option<[f64; 2]>,
-) -> Result<Option<UffFunction>, UffError> {
+) -> Result<Option<UffFunction>, String> {
     for _ in 0..5 {
         reader.expect("the name of a function")?;
     }
@@ -229,7 +205,8 @@ fn function(
     reader.expect("the denominator")?;
     reader.expect("the third axis")?;
     if !matches!(form.code, 2 | 4 | 5 | 6) {
-        return Err(UffError::Form { line: form.line, form: form.code });
+        let ValueForm { line, code, .. } = form;
+        return Err(format!("line {line}: form {code} of values is not known; use 2, 4, 5 or 6"));
     }
     let numbers = match binary {
         Some(binary) => bytes_to_numbers(reader, &binary, &form)?,
@@ -244,19 +221,20 @@ fn function(
     };
     let values: Vec<(f64, Complex<f64>)> = numbers.chunks_exact(form.per_value()).enumerate().map(value).collect();
     if values.iter().any(|(hz, H)| !(hz.is_finite() && H.re.is_finite() && H.im.is_finite())) {
-        return Err(UffError::NotFinite { line: start });
+        return Err(format!("line {start}: a value of this function is not finite"));
     }
     let (response, reference) = ((node, direction), (other, other_direction));
     Ok(Some(UffFunction { line: start, response, reference, ordinate, unit, per_si, values }))
 }
 
-fn text_to_numbers(reader: &mut Lines<'_>, form: &ValueForm) -> Result<Vec<f64>, UffError> {
+fn text_to_numbers(reader: &mut Lines<'_>, form: &ValueForm) -> Result<Vec<f64>, String> {
     let wanted = form.count * form.per_value();
     let mut numbers = Vec::new();
     while numbers.len() < wanted {
         let line = reader.expect("a value")?;
         if line.trim() == "-1" {
-            return Err(UffError::Short { line: reader.line, found: numbers.len(), wanted, head: form.line });
+            let (line, found, head) = (reader.line, numbers.len(), form.line);
+            return Err(format!("line {line}: found {found} of the {wanted} values announced in line {head}"));
         }
         for word in fields(&line) {
             numbers.push(number(&word).ok_or_else(|| reader.unexpected("a number", word))?);
@@ -286,13 +264,15 @@ fn fields(line: &str) -> Vec<String> {
     words
 }
 
-fn bytes_to_numbers(reader: &mut Lines<'_>, binary: &Binary, form: &ValueForm) -> Result<Vec<f64>, UffError> {
+fn bytes_to_numbers(reader: &mut Lines<'_>, binary: &Binary, form: &ValueForm) -> Result<Vec<f64>, String> {
     let wanted = form.count * form.per_value();
     let size = if form.is_double() { 8 } else { 4 };
     let bytes = reader.bytes.get(reader.at..).unwrap_or_default();
     if binary.bytes != wanted * size || bytes.len() < binary.bytes {
-        let (dataset, file) = (binary.bytes, bytes.len());
-        return Err(UffError::Bytes { line: form.line, wanted, size, dataset, file });
+        let (line, dataset, file) = (form.line, binary.bytes, bytes.len());
+        return Err(format!(
+            "line {line}: {wanted} numbers of {size} bytes are announced; the dataset has {dataset} bytes, the file {file}"
+        ));
     }
     let value = |chunk: &[u8]| {
         let mut own = [0u8; 8];

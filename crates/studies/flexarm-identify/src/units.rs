@@ -1,12 +1,9 @@
 //! Checks of measurements against the nominal arm: modes and units.
 
-use crate::estimation::{
-    Form, Instrument, MeasuredArm, MeasuredResponse, Measurements, NominalArm, Reading, ReadingKind, Target,
-};
-use flexarm_kinematics::Pose;
+use crate::estimation::{Form, MeasuredArm, MeasuredResponse, Measurements, NominalArm, Reading, ReadingKind};
 use nalgebra::{DVector, Vector3};
 
-use super::error::IdentifyFileError;
+use super::error::refused;
 use super::file::MeasurementInput;
 use flexarm_run::Error;
 
@@ -23,8 +20,8 @@ pub(super) fn check_modes(nominal: &NominalArm, input: &MeasurementInput) -> Res
     for reading in &input.measurements.readings {
         let ReadingKind::Frequencies { rows, .. } = &reading.kind else { continue };
         if let Some(row) = rows.iter().find(|row| row.of >= modes) {
-            let reading = reading.name.clone();
-            return Err(IdentifyFileError::NoMode { reading, mode: row.of + 1, modes }.into());
+            let (name, mode) = (&reading.name, row.of + 1);
+            return Err(refused(format!("{name}: mode {mode} does not exist, the model has {modes} modes")));
         }
     }
     Ok(())
@@ -33,16 +30,7 @@ pub(super) fn check_modes(nominal: &NominalArm, input: &MeasurementInput) -> Res
 /// Compares displacements and distances with those of the nominal robot; a large ratio indicates
 /// wrong units.
 pub(super) fn check_units(nominal: &NominalArm, input: &MeasurementInput) -> Result<(), Error> {
-    let of = |which: fn(&Reading) -> bool| {
-        let mut some = input.measurements.of_readings(|k| which(&input.measurements.readings[k]));
-        some.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
-        some.targets.iter_mut().for_each(|t| {
-            if let Target::Unknown(guess) = t {
-                *t = Target::Known(*guess);
-            }
-        });
-        some
-    };
+    let of = |which: fn(&Reading) -> bool| input.measurements.in_world(|k| which(&input.measurements.readings[k]));
     // An arm without equilibrium is not judged here.
     let both = |some: &Measurements| {
         let arm = MeasuredArm { nominal, parameters: &[], measurements: some };
@@ -71,10 +59,19 @@ pub(super) fn check_units(nominal: &NominalArm, input: &MeasurementInput) -> Res
         let off: f64 = measured.iter().zip(&expected).step_by(2).map(|(a, b)| a - b).sum();
         let ratio = (off / response.points.len() as f64).exp();
         if expected.iter().any(|x| !x.is_finite()) {
-            return Err(IdentifyFileError::Still { reading: reading.name }.into());
+            return Err(refused(format!(
+                "{}: in the model the arm does not move there in that direction, or cannot be excited so: check nodes, \
+                 their links and directions",
+                reading.name
+            )));
         }
         if !(1.0 / UNIT_RATIO..=UNIT_RATIO).contains(&ratio) {
-            return Err(IdentifyFileError::ResponseUnits { reading: reading.name, ratio }.into());
+            return Err(refused(format!(
+                "{}: the measured response is {ratio:.3e} times as large as that of the robot model, which is \
+                 implausible; check the unit, the measured quantity (displacement, velocity, acceleration), nodes and \
+                 directions",
+                reading.name
+            )));
         }
     }
     Ok(())
@@ -88,7 +85,11 @@ fn check_frequencies(measured: &[f64], expected: &[f64]) -> Result<(), Error> {
     match !ratios.is_empty() && ratios.iter().all(in_rad) {
         true => {
             let ratio = (ratios.iter().map(|ratio| ratio.ln()).sum::<f64>() / ratios.len() as f64).exp();
-            Err(IdentifyFileError::Radians { ratio }.into())
+            Err(refused(format!(
+                "the measured frequencies are {ratio:.2} times as large as those of the robot model, all of them about \
+                 2 pi times: they are expected in Hz; divide numbers in rad/s by 2 pi, or give initial stiffnesses of \
+                 the right order of magnitude"
+            )))
         }
         false => Ok(()),
     }
@@ -111,5 +112,9 @@ fn check_ratio(what: &'static str, measured: f64, expected: f64, input: &Measure
         Some((name, _)) => format!("with length = {name:?} they would agree in magnitude"),
         None => "check units, loads and the initial stiffnesses".into(),
     };
-    Err(IdentifyFileError::Units { what, ratio, length: input.length, help }.into())
+    Err(refused(format!(
+        "the measured {what} are {ratio:.3e} times as large as those of the robot model, which is implausible. The file \
+         has length = {:?}; {help}",
+        input.length
+    )))
 }

@@ -4,12 +4,15 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-use flexarm_identify::{Identification, IdentifyRequest, identify_robot};
-use flexarm_kinematics::{Pose, Wrench};
+use flexarm_identify::{
+    Identification, IdentifyRequest, NominalArm, identify_robot, nominal, parameters_like, tool_slopes,
+};
+use flexarm_kinematics::{Pose, Wrench, rotation_vector};
 use flexarm_run::caveat::Use;
 use flexarm_run::{Error, Modelling, Robot};
+use flexarm_stepping::OperatingPoint;
 use flexarm_testkit::Draw;
-use nalgebra::{Rotation3, Translation3, Vector3};
+use nalgebra::{Rotation3, Translation3, Vector3, Vector6};
 
 /// Joint values and the markers of two targets; `None` where a coordinate was not seen.
 type Row = (Vec<f64>, [[Option<f64>; 3]; 2]);
@@ -110,7 +113,11 @@ impl Place {
     }
 
     fn identify(&self, robot: &Robot, std: &str) -> Result<Identification, Error> {
-        let mut text = "format = 1\nfit = [\"drive.*\", \"joint.*.zero\"]\n[instrument.camera]\n".to_owned();
+        self.identify_all(robot, r#"["drive.*", "joint.*.zero"]"#, std)
+    }
+
+    fn identify_all(&self, robot: &Robot, fit: &str, std: &str) -> Result<Identification, Error> {
+        let mut text = format!("format = 1\nfit = {fit}\n[instrument.camera]\n");
         for (name, link, xyz) in HANDS {
             let near = xyz.map(|x| x + 0.004);
             let _ = writeln!(text, "[target.{name}]\nlink = \"{link}\"\nxyz = {near:?}\nunknown = true");
@@ -203,6 +210,87 @@ fn two_hands_in_one_fit_tell_the_springs_and_the_written_file_is_the_model_of_th
     assert!(told >= 48 && inside * 100 >= told * 88, "{inside} of {told}");
 }
 
+/// Truth: links whose masses differ from the file's by 6 to 15 % and whose centres of mass are
+/// elsewhere; the springs are known.
+#[test]
+fn masses_and_centres_of_mass_are_found_where_they_bend_the_arm_and_stay_where_they_do_not() {
+    let place = Place::new("masses");
+    // Relative error of the mass, and centre of mass (m).
+    let true_of: [(&str, f64, [f64; 3]); 5] = [
+        ("pitch", 1.06, [0.17, 0.02, 0.01]),
+        ("l1", 0.9, [0.215, 0.015, -0.01]),
+        ("l2", 1.15, [0.14, -0.01, 0.005]),
+        ("r1", 0.93, [0.18, 0.02, 0.0]),
+        ("r2", 1.12, [0.165, 0.01, 0.0]),
+    ];
+    let mass_of = |name: &str| LINKS[JOINTS.iter().position(|joint| *joint == name).unwrap()].2;
+    let inertials: String = true_of
+        .iter()
+        .map(|(name, by, com)| {
+            format!("[[inertial]]\nlink = \"{name}\"\nmass = {:?}\ncom = {com:?}\n", by * mass_of(name))
+        })
+        .collect();
+    let springs = [2.2e4, 4.0e3, 1.5e3, 6.0e3, 1.5e3, 3.0e4, 5.0e4].map(|k| 0.1 * k);
+    let truth = place.robot("truth.toml", springs, &inertials);
+    let guess = place.robot("guess.toml", springs, "");
+    let (mut inside, mut told) = (0, 0);
+    for seed in 0..6 {
+        let mut draw = Draw(170 + seed);
+        let rows = place.measure(&truth, &mut draw, &|_, _| {});
+        let found = place.identify_all(&guess, r#"["link.*.mass", "link.*.com.*"]"#, "").unwrap();
+        assert_eq!(found.parameters.len(), 4 * JOINTS.len());
+        let written = rms(&Robot::load(place.0.join("out")).unwrap(), &found, &rows);
+        let apart = (written / found.residual.after - 1.0).abs();
+        eprintln!("residual {:.4e} m, the written file {apart:.1e} of it off", found.residual.after);
+        assert!(apart < 1e-6, "{written:e} {:e}", found.residual.after);
+        assert!((0.8..1.1).contains(&(found.residual.after / NOISE)), "{:?}", found.residual);
+        for p in &found.parameters {
+            let (link, key) = p.name["link.".len()..].split_once('.').unwrap();
+            let Some((_, by, com)) = true_of.iter().find(|(name, ..)| *name == link) else {
+                // The first axis is vertical: its link bends nothing.
+                assert!(!p.identifiable && (p.value - p.initial).abs() < 1e-6, "{p:?}");
+                continue;
+            };
+            let truth = match key {
+                "mass" => by * mass_of(link),
+                _ => com["xyz".find(&key[4..]).unwrap()],
+            };
+            if p.identifiable {
+                (told, inside) = (told + 1, inside + usize::from(p.interval[0] < truth && truth < p.interval[1]));
+            }
+            assert!(key != "mass" || (p.value / p.initial - 1.0).abs() < 0.4, "{p:?}");
+        }
+    }
+    eprintln!("{inside} of {told} intervals hold the truth");
+    assert!(told >= 24 && inside * 100 >= told * 88, "{inside} of {told}");
+}
+
+/// Truth: the robot file of a shipped robot with two other masses, one of them of a beam.
+#[test]
+fn masses_of_beams_and_of_rigid_links_are_written_to_the_robot_file_that_gives_them() {
+    let place = Place::new("beams");
+    let beam = |mass: &str| {
+        format!(
+            "[[flexible_link]]\nlink = \"l1\"\n{mass}damping = {{ modal = 0.02 }}\nsegments = 3\n\
+             beam = {{ section = \"tube\", outer_diameter = 0.05, wall = 0.001, material = \"steel\" }}\n"
+        )
+    };
+    let springs = [2.2e3, 4.0e2, 1.5e2, 6.0e2, 1.5e2, 3.0e3, 5.0e3];
+    let other = beam("mass = 5.4\n") + "[[inertial]]\nlink = \"l2\"\nmass = 2.7\n";
+    let truth = place.robot("truth.toml", springs, &other);
+    let guess = place.robot("guess.toml", springs, &beam(""));
+    let rows = place.measure(&truth, &mut Draw(31), &|_, _| {});
+    let found = place.identify_all(&guess, r#"["link.l*.mass"]"#, "").unwrap();
+    let text = std::fs::read_to_string(place.0.join("out/robot.toml")).unwrap();
+    let written = rms(&Robot::load(place.0.join("out")).unwrap(), &found, &rows);
+    let apart = (written / found.residual.after - 1.0).abs();
+    for (p, truth) in found.parameters.iter().zip([5.4, 2.7]) {
+        eprintln!("{} = {:.4} +- {:.4} kg, truth {truth}", p.name, p.value, p.std);
+        assert!(p.identifiable && p.interval[0] < truth && truth < p.interval[1], "{p:?}");
+    }
+    assert!(apart < 1e-6 && text.lines().filter(|line| line.starts_with("mass = ")).count() == 2, "{apart} {text}");
+}
+
 #[test]
 fn a_wrong_sign_a_zero_off_by_a_right_angle_and_mirrored_axes_are_named() {
     let place = Place::new("slips");
@@ -219,6 +307,39 @@ fn a_wrong_sign_a_zero_off_by_a_right_angle_and_mirrored_axes_are_named() {
         let error = place.identify(&guess, "").expect_err(words).to_string();
         assert!(error.contains(words), "{error}");
     }
+}
+
+/// Truth: sixth-order differences of equilibria, for all frames of a robot with three loops, of which
+/// two depend on the first, under weight and a load.
+#[test]
+fn the_tool_of_a_robot_with_loops_moves_with_its_joint_frames_as_differences_say() {
+    let robots = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../robots");
+    let arm = Robot::load(robots.join("palletiser")).unwrap().model(&Modelling::default()).unwrap();
+    let (nominal, load) = (nominal(&arm), Wrench::new(Vector3::new(300.0, -200.0, -500.0), Vector3::zeros()));
+    let q = [0.4, 0.3, -0.5, 0.6];
+    let solved = |nominal: &NominalArm| {
+        let mut at = OperatingPoint::new(nominal.at_rest(&q).unwrap(), nominal.tool.clone());
+        at.solve(&q, &load).unwrap();
+        at
+    };
+    let parameters = parameters_like(&arm, "joint.*");
+    let mut at = solved(&nominal);
+    let (slopes, here) = (tool_slopes(&mut at, &parameters), at.tcp_pose());
+    let mut worst = 0.0_f64;
+    for (k, parameter) in parameters.iter().enumerate() {
+        let moved = |x: f64| {
+            let X = solved(&nominal.with(std::slice::from_ref(parameter), &[x])).tcp_pose();
+            let turn = rotation_vector((X.rotation * here.rotation.inverse()).matrix());
+            Vector6::from_iterator(X.translation.vector.iter().chain(&turn).copied())
+        };
+        let d = |h: f64| (moved(h) - moved(-h)) / (2.0 * h);
+        let (a, b, c) = (d(4e-3), d(2e-3), d(1e-3));
+        let truth = (c * 64.0 - b * 20.0 + a) / 45.0;
+        let error = (slopes.column(k) - truth).amax();
+        worst = worst.max(error);
+        assert!(error < 1e-7, "{}: {error:e} of {:e}", parameter.name, truth.amax());
+    }
+    eprintln!("{} frames, error at most {worst:.1e}", parameters.len());
 }
 
 /// Joint, parent, origin of an arm whose upper arm is driven by a parallelogram.

@@ -1,12 +1,12 @@
 //! Stiffness of coupled gears from the encoders of all joints.
 
-use flexarm_identify::{CoupledOutput, GearRun, coupled_gear_stiffness, gear_stiffness};
+use flexarm_identify::{GearOutput, gear_stiffness};
 
 const C: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [-0.2, 1.0, 0.0], [0.4, -0.3, 1.0]];
 const STIFFNESS: [f64; 3] = [2e6, 9e5, 4e5];
 const DELAY: [f64; 3] = [3e-3, -1e-3, 2e-3];
 
-fn run(seed: f64, noise: f64) -> Vec<CoupledOutput> {
+fn run(seed: f64, noise: f64) -> Vec<GearOutput> {
     let t = |k: usize| 0.004 * k as f64;
     let tau: Vec<Vec<f64>> = (0..3)
         .map(|j| {
@@ -21,7 +21,7 @@ fn run(seed: f64, noise: f64) -> Vec<CoupledOutput> {
         let error = |s: usize| noise * (17.0 * t(s) * (1.0 + 0.1 * seed + 0.3 * i as f64)).sin();
         let spring = |s: usize| (0..3).map(|k| torques[k][s] / STIFFNESS[k]).sum::<f64>();
         let deflection = (0..2500).map(|s| spring(s) + DELAY[i] * rate[s] + 1e-3 * seed + error(s)).collect();
-        CoupledOutput { deflection, rate, deflection_rate: vec![0.0; 2500], instruments: torques.clone(), torques }
+        GearOutput { deflection, rate, deflection_rate: vec![0.0; 2500], instruments: torques.clone(), torques }
     };
     (0..3).map(output).collect()
 }
@@ -31,7 +31,7 @@ fn springs_of_coupled_motors_are_found_from_all_encoders_and_from_the_last_one_a
     let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| run(seed, 0.0)).to_vec();
     let last: Vec<_> = runs.iter().map(|run| run[2..].to_vec()).collect();
     for runs in [&runs[..], &runs[..1], &last[..]] {
-        let found = coupled_gear_stiffness(runs).unwrap();
+        let found = gear_stiffness(runs).unwrap();
         for (gear, truth) in found.iter().zip(STIFFNESS) {
             let error = (gear.stiffness / truth - 1.0).abs();
             // Measured: at most 1e-12.
@@ -40,32 +40,8 @@ fn springs_of_coupled_motors_are_found_from_all_encoders_and_from_the_last_one_a
     }
     // Without noise the delays are exact too; the first spring's largest contribution is in its
     // own encoder.
-    let found = coupled_gear_stiffness(&runs).unwrap();
+    let found = gear_stiffness(&runs).unwrap();
     assert!((found[0].delay_s - DELAY[0]).abs() < 1e-10 && (found[2].delay_s - DELAY[2]).abs() < 1e-10);
-}
-
-#[test]
-fn a_single_gear_comes_out_as_by_itself() {
-    let runs: Vec<_> = [0.0, 1.0, 2.0].map(|seed| vec![run(seed, 1e-5).swap_remove(0)]).to_vec();
-    let only = |run: &Vec<CoupledOutput>| {
-        let CoupledOutput { deflection, rate, deflection_rate, torques, .. } = run[0].clone();
-        let torques = vec![torques[0].clone()];
-        vec![CoupledOutput { deflection, rate, deflection_rate, instruments: torques.clone(), torques }]
-    };
-    let runs: Vec<_> = runs.iter().map(only).collect();
-    let plain: Vec<GearRun> = runs
-        .iter()
-        .map(|run| GearRun {
-            deflection: run[0].deflection.clone(),
-            torque: run[0].torques[0].clone(),
-            instrument: run[0].torques[0].clone(),
-            rate: run[0].rate.clone(),
-            deflection_rate: vec![0.0; 2500],
-        })
-        .collect();
-    let (a, b) = (&coupled_gear_stiffness(&runs).unwrap()[0], gear_stiffness(&plain).unwrap());
-    assert!((a.stiffness / b.stiffness - 1.0).abs() < 1e-12 && (a.std_ln / b.std_ln - 1.0).abs() < 1e-9);
-    assert!((a.r2 - b.r2).abs() < 1e-12 && (a.unseen_r2[1] - b.unseen_r2[1]).abs() < 1e-12);
 }
 
 #[test]
@@ -77,5 +53,5 @@ fn springs_that_the_encoders_do_not_tell_apart_are_not_made_up() {
         run[0].torques = vec![run[0].torques[0].clone(); 2];
         run[0].instruments = run[0].torques.clone();
     }
-    assert!(coupled_gear_stiffness(&runs).is_none());
+    assert!(gear_stiffness(&runs).is_none());
 }

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use flexarm_identify::*;
-use flexarm_kinematics::{Model, Pose, SpatialInertia, Wrench};
+use flexarm_kinematics::{LinkInertia, Model, Pose, SpatialInertia, Wrench};
 use flexarm_stepping::{Damping, OperatingPoint, Spring};
 use flexarm_testkit::{Draw, reference_arm};
 use nalgebra::{Complex, DMatrix, DVector, Matrix3, Rotation3, Translation3, Vector3, Vector6};
@@ -40,7 +40,27 @@ fn parameters(nominal: &NominalArm) -> Vec<Parameter> {
     // Three displacements of one frame, which follow each other, and the zero of another joint.
     all.extend([0, 5, 4].map(|axis| frame(nominal, "joint2", Vector6::ith(axis, 1.0))));
     all.push(frame(nominal, "joint4", Vector6::ith(5, 1.0)));
+    // Mass and centre of mass of one link, whose effects multiply, and the mass of one in two parts.
+    let tool = nominal.tool.body;
+    all.extend([None, Some(0), Some(2)].map(|axis| inertial(&[(tool, 9.0)], axis)));
+    all.push(inertial(&[(tool - 2, 20.0), (tool - 1, 10.0)], None));
     all
+}
+
+fn inertial(masses: &[(usize, f64)], axis: Option<usize>) -> Parameter {
+    let X_BL = Pose::from_parts(Translation3::new(0.1, 0.0, -0.2), Rotation3::from_euler_angles(0.3, 0.5, -0.7));
+    let part = |(body, mass): &(usize, f64)| {
+        let inertia_com = Matrix3::from_diagonal(&Vector3::new(0.2, 0.3, 0.25)) * *mass;
+        LinkPart {
+            body: *body,
+            X_BL,
+            inertia: LinkInertia { mass: *mass, com: Vector3::new(0.1, 0.2, 0.0), inertia_com },
+        }
+    };
+    let parts: Vec<LinkPart> = masses.iter().map(part).collect();
+    let initial = axis.map_or(masses.iter().map(|(_, mass)| mass).sum(), |_| 0.1);
+    let effect = Effect::Link { parts, axis, size: 1.0 };
+    Parameter { name: format!("link {axis:?}"), unit: "1".into(), initial, prior: None, effect }
 }
 
 fn frame(nominal: &NominalArm, joint: &str, twist: Vector6<f64>) -> Parameter {
@@ -52,6 +72,8 @@ fn frame(nominal: &NominalArm, joint: &str, twist: Vector6<f64>) -> Parameter {
 fn step_of(parameter: &Parameter) -> f64 {
     match parameter.effect {
         Effect::Entry { size, .. } => 0.01 * size,
+        Effect::Link { axis: None, .. } => 0.3,
+        Effect::Link { .. } => 0.02,
         _ => 0.01,
     }
 }
@@ -145,7 +167,7 @@ fn readings_of_all_kinds_change_with_entries_and_with_the_tool_as_differences_sa
             };
             let h = step_of(parameter) * if k > 2 { 0.2 } else { 1.0 };
             let truth = richardson(h, residuals);
-            let size = truth.amax().max(1e-3 * largest / step_of(parameter));
+            let size = truth.amax().max(3e-3 * largest / step_of(parameter));
             let error = (J.column(p) - &truth).amax();
             eprintln!("reading {k}, {}: {:.1e} of {:.2e}", parameter.name, error / size, truth.amax());
             // Measured: at most 7e-10; derivatives of vibrations by frames are differences: 2e-7.

@@ -245,13 +245,12 @@ fn planned_poses_tell_more_than_random_ones_and_the_deviations_promised_are_thos
     let (nominal, parameters) = (nominal(), parameters());
     for seed in 0..10 {
         let mut draw = Draw(100 + seed);
-        let candidates: Vec<Candidate> = pulled(&mut draw, 60).readings.into_iter().map(Candidate).collect();
+        let candidates = pulled(&mut draw, 60).readings;
         let options = PlanOptions { count: 6, ..PlanOptions::default() };
         let planned = plan(&nominal, &parameters, &candidates, &options).unwrap();
-        let random: Vec<Candidate> = candidates[..6].to_vec();
-        let others = plan(&nominal, &parameters, &random, &options).unwrap();
+        let others = plan(&nominal, &parameters, &candidates[..6], &options).unwrap();
         assert!(planned.gain > others.gain + 0.5, "{} {}", planned.gain, others.gain);
-        let readings = planned.chosen.iter().map(|k| candidates[*k].0.clone()).collect();
+        let readings = planned.chosen.iter().map(|k| candidates[*k].clone()).collect();
         let poses = Measurements { readings, ..Measurements::default() };
         // Readings without noise: the deviations equal those of the plan, except for the influence
         // of its prior.

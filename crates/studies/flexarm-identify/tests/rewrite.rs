@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_identify::ParameterEstimate;
+use flexarm_identify::FittedParameter;
 use flexarm_identify::internals::{ParameterLocation, displacement, rewritten};
 use flexarm_kinematics::Pose;
 use flexarm_run::Calibration;
@@ -10,9 +10,9 @@ use flexarm_stepping::GuideTerm;
 use nalgebra::{Rotation3, Translation3, Vector6};
 use toml_edit::{DocumentMut, Item, Table};
 
-fn found(name: &str, initial: f64, value: f64, std: f64) -> ParameterEstimate {
+fn found(name: &str, initial: f64, value: f64, std: f64) -> FittedParameter {
     let (name, unit) = (name.to_owned(), "N m/rad".to_owned());
-    ParameterEstimate { name, unit, initial, value, std, interval: [0.0, 0.0], identifiable: true, rigid: false }
+    FittedParameter { name, unit, initial, value, std, interval: [0.0, 0.0], identifiable: true, rigid: false }
 }
 
 #[test]

@@ -27,7 +27,7 @@ fn stiffness(name: &str, spring: usize, coordinate: Option<usize>) -> Parameter 
 
 fn parameters(nominal: &NominalArm) -> Vec<Parameter> {
     let per_kg = SpatialInertia::from_com(1.0, &Vector3::new(0.1, -0.05, 0.2), &(Matrix3::identity() * 0.02));
-    let mass = Effect::Mass { body: nominal.tool.body, per_kg };
+    let mass = Effect::Mass(vec![(nominal.tool.body, per_kg)]);
     vec![
         stiffness("lower", 0, None),
         stiffness("upper", 1, None),

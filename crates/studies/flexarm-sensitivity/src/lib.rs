@@ -28,7 +28,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
-use flexarm_identify::{Effect, Parameter, link_directions, link_entries, nominal, parameters};
+use flexarm_identify::{Effect, Parameter, nominal, parameters, parameters_like};
 use flexarm_stepping::{ExactRun, StepError, StepperKind};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -183,9 +183,9 @@ fn slopes_and_caveats(
 /// Returns the differentiable parameters of the arm; matrix entries, which are many, only if
 /// requested by name.
 fn numbers(arm: &Arc<Arm>, asked: &[String]) -> Vec<Parameter> {
-    let entries = link_entries(arm).into_iter();
+    let entries = parameters_like(arm, "link.*.stiffness[*][*]").into_iter();
     let entries = entries.filter(|own| asked.iter().any(|pattern| asks_for(pattern, &own.name)));
-    parameters(arm).into_iter().chain(link_directions(arm)).chain(entries).collect()
+    parameters(arm).into_iter().chain(parameters_like(arm, "link.*.stiffness_factors[*]")).chain(entries).collect()
 }
 
 /// Returns all parameters by which the error along a motion is differentiated.
@@ -197,7 +197,7 @@ fn run_parameters(arm: &Arc<Arm>, scenario: &Scenario, asked: &[String]) -> Resu
     };
     // A payload replaced at the start has no effect.
     let gone = scenario.payloads.iter().any(|payload| payload.at_s <= SAME_TIME);
-    let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass { .. }));
+    let there = |own: &Parameter| !(gone && matches!(own.effect, Effect::Mass(_)));
     let mut all: Vec<NamedParameter> = numbers(arm, asked).into_iter().filter(there).map(of_arm).collect();
     let model = &arm.model;
     for (k, coordinate) in model.coordinates()[..model.n_actuated()].iter().enumerate() {

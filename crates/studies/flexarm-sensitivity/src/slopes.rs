@@ -172,10 +172,11 @@ impl Repeated<'_> {
         match parameter {
             RunParameter::Arm(own) => match &own.effect {
                 Effect::Damping(_) | Effect::Damper { .. } => OF_AMPLITUDE,
-                Effect::Mass { body, .. } => {
+                Effect::Mass(on) => {
                     let bodies = self.nominal.model.bodies();
                     let all: f64 = bodies.iter().skip(1).map(|body| body.inertia.mass).sum();
-                    OF_FREQUENCY * bodies[*body].inertia.mass.max(1e-3 * all)
+                    let own: f64 = on.iter().map(|(body, _)| bodies[*body].inertia.mass).sum();
+                    OF_FREQUENCY * own.max(1e-3 * all)
                 }
                 Effect::Entry { size, .. } => OF_FREQUENCY * size,
                 Effect::Guide { size, .. } if !own.is_logarithmic() => OF_FREQUENCY * size,
@@ -195,7 +196,7 @@ impl Repeated<'_> {
             Some((RunParameter::Arm(own), x)) => {
                 let changed = self.nominal.with(std::slice::from_ref(own), &[x]);
                 (arm.model, springs, run.tool) = (changed.model, changed.springs, changed.tool);
-                if let (Effect::Mass { .. }, Some(frame)) = (&own.effect, arm.rigid.frame(PAYLOAD_LINK)) {
+                if let (Effect::Mass(_), Some(frame)) = (&own.effect, arm.rigid.frame(PAYLOAD_LINK)) {
                     let mut inertia = arm.rigid.bodies()[frame.body].inertia;
                     inertia += SpatialInertia { mass: x, ..SpatialInertia::zeros() }.at_parent(&frame.X_BF);
                     arm.rigid = Arc::new(arm.rigid.with_inertia(frame.body, inertia));

@@ -1,5 +1,6 @@
 //! Rates of the loops at given velocities: γ of equation (3) and the time derivative of T.
 
+use flexarm_spatial::Twist;
 use nalgebra::{Matrix2, Vector2, Vector3};
 
 use crate::closure::placed_loop::PlacedLoop;
@@ -14,7 +15,7 @@ impl Solved {
         let nv = self.nv;
         for (k, loop_) in model.loops.iter().enumerate() {
             loop_.place_chains(model, data, &mut to.X);
-            loop_.move_chains(model, data, q, qdot, to);
+            loop_.move_chains(model, data, q, qdot, None, to);
             let (J, Jdot) = (&self.J[k], &to.Jdot);
             let minus = -self.inverse[k];
             // J̇ q̇ over all coordinates, plus the γ of dependent joints of earlier loops.
@@ -30,6 +31,30 @@ impl Solved {
             if with_T {
                 self.slope_rates(loop_, k, minus, to);
             }
+        }
+    }
+
+    /// Writes the rates of the dependent coordinates into `qdot` and Ṫ into `to`, as the subtree of a
+    /// body moves with a twist (world axes, about the world origin) while the independent
+    /// coordinates keep their values.
+    pub(super) fn rates_of_subtree(
+        &self,
+        model: &Model,
+        data: &Data,
+        q: &[f64],
+        (body, moved): (usize, &Twist),
+        qdot: &mut [f64],
+        to: &mut LoopRates,
+    ) {
+        qdot.fill(0.0);
+        for (k, loop_) in model.loops.iter().enumerate() {
+            loop_.place_chains(model, data, &mut to.X);
+            let common = moved.at_child(&data.X_WB[loop_.common]);
+            loop_.move_chains(model, data, q, qdot, Some((body, &common)), to);
+            let rate = self.inverse[k] * loop_.gap_rate(to);
+            (qdot[loop_.first], qdot[loop_.first + 1]) = (-rate.x, -rate.y);
+            loop_.move_chains(model, data, q, qdot, Some((body, &common)), to);
+            self.slope_rates(loop_, k, -self.inverse[k], to);
         }
     }
 
@@ -57,7 +82,17 @@ impl Solved {
 
 impl PlacedLoop {
     /// Velocities in the axes of the common body, and the time derivative of the Jacobian.
-    fn move_chains(&self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], to: &mut LoopRates) {
+    ///
+    /// * `moved`: additional twist of the subtree of a body, axes and origin of the common body.
+    fn move_chains(
+        &self,
+        model: &Model,
+        data: &Data,
+        q: &[f64],
+        qdot: &[f64],
+        moved: Option<(usize, &Twist)>,
+        to: &mut LoopRates,
+    ) {
         let LoopRates { X, v, w, Jdot, .. } = to;
         (v[self.common], w[self.common]) = (Vector3::zeros(), Vector3::zeros());
         // Velocities of the bodies, from the common body outward.
@@ -69,6 +104,10 @@ impl PlacedLoop {
                 v_i += l * qdot[k];
                 w_i += a * qdot[k];
             });
+            if let Some((_, twist)) = moved.filter(|(body, _)| *body == i) {
+                v_i += twist.linear + twist.angular.cross(&X[i].translation.vector);
+                w_i += twist.angular;
+            }
             (v[i], w[i]) = (v_i, w_i);
         }
         // Columns of J̇ in A axes: d/dt (l + a × r) - w_A × (l + a × r).
@@ -88,5 +127,13 @@ impl PlacedLoop {
                 });
             }
         }
+    }
+
+    /// Time derivative of (1) at the velocities of the last [`Self::move_chains`].
+    fn gap_rate(&self, at: &LoopRates) -> Vector2<f64> {
+        let LoopRates { X, v, w, .. } = at;
+        let (A, p_B) = self.ends_at(X);
+        let [v_A, v_B] = self.ends.map(|i| v[i] + w[i].cross(&(p_B - X[i].translation.vector)));
+        (A.rotation.inverse() * (v_B - v_A)).xy()
     }
 }

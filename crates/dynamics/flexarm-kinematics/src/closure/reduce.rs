@@ -1,5 +1,6 @@
 //! Matrices of the tree reduced to the independent coordinates: mass matrix and static tangent.
 
+use flexarm_spatial::Twist;
 use nalgebra::DMatrix;
 
 use crate::closure::workspace::{LoopRates, Solved};
@@ -74,5 +75,33 @@ impl LoopTangent {
                 }
             }
         }
+    }
+
+    /// Adds the change of the forces on the independent coordinates to `dtau`, given that on the
+    /// coordinates of the opened tree at constant dependent ones, as the subtree of a body moves with
+    /// a twist; returns the rates of the dependent coordinates.
+    pub(crate) fn add_moved_subtree(
+        &mut self,
+        model: &Model,
+        data: &Data,
+        first: usize,
+        moved: (usize, &Twist),
+        (tau_d, dtree): (&[f64], &mut [f64]),
+        dtau: &mut [f64],
+    ) -> &[f64] {
+        let Some(loops) = &data.loops else { return &[] };
+        let (solved, nv) = (&loops.solved, loops.solved.nv);
+        solved.rates_of_subtree(model, data, &loops.q, moved, &mut self.qdot, &mut self.rates);
+        for (k, rate) in (nv - first..).zip(&self.qdot[nv..]) {
+            dtree.iter_mut().zip(self.G.column(k).iter()).for_each(|(to, slope)| *to += slope * rate);
+        }
+        let (own, dependent) = dtree.split_at(nv - first);
+        dtau.iter_mut().zip(own).for_each(|(to, own)| *to += own);
+        let rows = solved.T.chunks_exact(nv).zip(self.rates.Tdot.chunks_exact(nv));
+        for (((T, Tdot), dtau_d), tau_d) in rows.zip(dependent).zip(tau_d) {
+            let slopes = T.iter().zip(Tdot).skip(first);
+            dtau.iter_mut().zip(slopes).for_each(|(to, (t, tdot))| *to += t * dtau_d + tdot * tau_d);
+        }
+        &self.qdot[nv..]
     }
 }

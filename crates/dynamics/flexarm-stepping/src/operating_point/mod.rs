@@ -16,7 +16,9 @@ mod each;
 mod lanes;
 mod tangent;
 
-use flexarm_kinematics::{Data, Frame, Pose, Twist, Wrench, forward_kinematics, frame_jacobian, mass_matrix_at_poses};
+use flexarm_kinematics::{
+    Data, Frame, Pose, SpatialInertia, Twist, Wrench, forward_kinematics, frame_jacobian, mass_matrix_at_poses,
+};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::dense::Factor;
@@ -325,9 +327,31 @@ impl OperatingPoint {
         self.holding.as_slice()
     }
 
+    /// Adds the static forces on the elastic coordinates due to the weight of an additional inertia
+    /// on a body (about Bo, B axes) to `p` (n).
+    pub fn add_weight(&mut self, body: usize, inertia: &SpatialInertia, p: &mut [f64]) {
+        let model = self.plant.model.clone();
+        if self.plant.elements.iter().any(|element| element.geometric.is_some()) {
+            // Its stiffness depends on the weight; forces are linear in a mass.
+            let n = self.r.len();
+            let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
+            let (plant, mut heavier) = (self.plant.clone(), model.bodies()[body].inertia);
+            heavier += *inertia;
+            self.forces_of(&plant.with_inertia(body, heavier), &mut with);
+            self.forces_of(&plant, &mut without);
+            p.iter_mut().zip((with - without).iter()).for_each(|(p, more)| *p += more);
+            return;
+        }
+        let frame = Frame { name: String::new(), body, X_BF: Pose::identity() };
+        let mut J = Matrix6xX::zeros(self.q.len());
+        frame_jacobian(&model, &self.data, &frame, &mut J);
+        let moment = (self.data.X_WB[body].rotation * inertia.first_moment).cross(&model.gravity);
+        let weight = Wrench::new(model.gravity * inertia.mass, moment).to_vector();
+        p.iter_mut().zip(J.column_iter().skip(model.n_actuated())).for_each(|(p, J)| *p -= J.dot(&weight));
+    }
+
     /// Writes the static forces on the elastic coordinates, without springs, of another arm of the
-    /// same tree at this equilibrium under weight, loads and the wrench into `p` (n). With changed
-    /// masses this gives the derivative with respect to a mass.
+    /// same tree at this equilibrium under weight, loads and the wrench into `p` (n).
     pub fn forces_of(&mut self, other: &Plant, p: &mut DVector<f64>) {
         let mut all = DVector::zeros(self.q.len());
         static_forces(other, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut all);
@@ -336,12 +360,12 @@ impl OperatingPoint {
 
     /// Returns the change of the static forces on the elastic coordinates and the twist of a frame
     /// (world axes, at its origin), as the subtree of a body moves with a twist in the body's joint
-    /// axes while all coordinates keep their values; `None` for arms with closed loops, balancers or
-    /// load-dependent stiffness.
-    pub fn moved_subtree(&self, body: usize, moved: &Twist, frame: &Frame, p: &mut [f64]) -> Option<Twist> {
+    /// axes while all coordinates keep their values; `None` for arms with balancers or load-dependent
+    /// stiffness.
+    pub fn moved_subtree(&mut self, body: usize, moved: &Twist, frame: &Frame, p: &mut [f64]) -> Option<Twist> {
         let model = &self.plant.model;
         let geometric = self.plant.elements.iter().any(|element| element.geometric.is_some());
-        if geometric || !model.loops().is_empty() || !model.balancers().is_empty() {
+        if geometric || !model.balancers().is_empty() {
             return None;
         }
         let own = &model.bodies()[body];
@@ -349,10 +373,10 @@ impl OperatingPoint {
         let (R, at) = (X_WJ.rotation, X_WJ.translation.vector);
         let w = R * moved.angular;
         let v = R * moved.linear + at.cross(&w);
-        self.slopes.add_moved_subtree(&self.plant, &self.data, body, &Twist::new(v, w), p);
-        let behind = model.is_in_subtree(frame.body, body);
+        let moved = (body, &Twist::new(v, w));
+        let seen = self.slopes.add_moved_subtree(&self.plant, &self.data, moved, frame.body, p);
         let p_F = self.data.X_WF(frame).translation.vector;
-        Some(if behind { Twist::new(v + w.cross(&p_F), w) } else { Twist::zeros() })
+        Some(Twist::new(seen.linear + seen.angular.cross(&p_F), seen.angular))
     }
 
     /// Returns the pose of a frame of the arm in the world at the equilibrium.

@@ -1317,6 +1317,8 @@ class Identification(TypedDict):
     """Correlation of the parameters, row after row."""
     untold: list[list[Weight]]
     """Combinations that the readings do not determine."""
+    combinations: list[str]
+    """Parameters that the readings do not determine, and those that they determine only together, in words."""
     residual: Residual
     """RMS of the residuals."""
     held_out: HeldOutFigures | None

@@ -105,7 +105,7 @@ pub(crate) fn middle(lower: f64, upper: f64) -> f64 {
 
 /// Entry of the Halton sequence in the base assigned to a coordinate, between 0 and 1.
 pub fn halton(mut index: u32, coordinate: usize) -> f64 {
-    const PRIMES: [u32; 8] = [2, 3, 5, 7, 11, 13, 17, 19];
+    const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
     let base = PRIMES[coordinate % PRIMES.len()];
     let (mut value, mut fraction) = (0.0, 1.0);
     while index > 0 {

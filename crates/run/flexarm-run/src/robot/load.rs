@@ -8,7 +8,7 @@ use flexarm_kinematics::{Joint, JointKind, Link, Mechanism, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, default_tcp, parse_urdf, read_urdf};
 use toml::Spanned;
 
-use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
+use super::entries::{held_joint, limit_effort, make_helical, tcp_of, weigh};
 use super::{Robot, TCP_FRAME, finding_text};
 use crate::arm::Arm;
 use crate::arm::options::Modelling;
@@ -168,7 +168,7 @@ impl Robot {
     ) -> Result<Arc<Arm>, Error> {
         let folder = path.parent().unwrap_or(Path::new("."));
         let mut faults: Vec<Error> = Vec::new();
-        let (rigid, calibration) = changed_joints(&mut urdf.mechanism, file, source, &mut faults);
+        let (rigid, calibration) = changed_mechanism(&mut urdf.mechanism, file, source, &mut faults);
         let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
         let mut robot = Self {
             name: file.name.clone().unwrap_or_else(|| name_of_folder(folder)),
@@ -294,9 +294,10 @@ fn urdf_options(
     Ok(urdf)
 }
 
-/// Returns the rigid robot with the gravity, helical joints, calibration and effort limits of the
-/// file, and its corrections of joints; those also go into the mechanism of the URDF.
-fn changed_joints(
+/// Returns the rigid robot with the gravity, helical joints, calibration, masses and effort limits of
+/// the file, and its corrections of joints; those and the masses also go into the mechanism of the
+/// URDF.
+fn changed_mechanism(
     urdf: &mut Mechanism,
     file: &RobotFile,
     source: &Source,
@@ -312,6 +313,9 @@ fn changed_joints(
     }
     let (calibration, wrong) = calibrate(&file.calibration, &mut [&mut rigid, urdf], source);
     faults.extend(wrong.into_iter().map(Error::from));
+    for entry in &file.inertial {
+        keep(weigh(entry, file, &mut [&mut rigid, urdf], source).map_err(Error::from), faults);
+    }
     for (joint, limit) in &file.effort_limit {
         keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), faults);
     }

@@ -16,6 +16,7 @@ use crate::robot::calibration_entry::CalibrationEntry;
 use crate::robot::controller_entry::ControllerAxisEntry;
 use crate::robot::coupling_entry::CouplingEntry;
 use crate::robot::drive_entry::DriveEntry;
+use crate::robot::entries::InertialEntry;
 use crate::robot::gauge_entry::{StrainGaugeEntry, StressPointEntry};
 use crate::robot::link_entry::FlexibleLinkEntry;
 use crate::robot::loop_entry::LoopEntry;
@@ -68,6 +69,9 @@ pub(crate) struct RobotFile {
     /// Corrections of joint frames and joint zeros.
     #[serde(default)]
     pub calibration: Vec<CalibrationEntry>,
+    /// Masses and centres of mass of rigid links, instead of the URDF's.
+    #[serde(default)]
+    pub inertial: Vec<InertialEntry>,
     /// Elastic mounting of the base.
     pub mounting: Option<Spanned<MountingEntry>>,
     /// Flexible links.

@@ -6,25 +6,25 @@ use nalgebra::{DMatrix, DVector, Vector3};
 use crate::estimation::least_squares::Solution;
 use crate::estimation::measurement::NoAnswer;
 
-/// Estimate of one parameter.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ParameterEstimate {
+/// Estimate of a number of the robot file.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct FittedParameter {
     /// Name, as in the robot file.
     pub name: String,
     /// Unit of the values.
     pub unit: String,
     /// Initial value.
     pub initial: f64,
-    /// Value of the fit, whether or not the readings determine it.
+    /// Value of the fit, which the new robot file has, whether or not the readings determine it.
     pub value: f64,
-    /// Standard deviation; NaN if the readings do not determine the value.
+    /// Standard deviation; NaN (null in JSON) if the parameter is not identifiable.
     pub std: f64,
-    /// 95 % confidence interval; NaN if the parameter is neither identifiable nor rigid.
+    /// 95 % confidence interval; NaN (nulls) if the parameter is neither identifiable nor rigid. The
+    /// upper end of a stiffness that is rigid within the readings is infinite (null).
     pub interval: [f64; 2],
-    /// Whether the readings determine the value.
+    /// Whether the readings determine the parameter.
     pub identifiable: bool,
-    /// Whether a spring or a clearance is rigid within the readings: `interval` has the least
-    /// stiffness that they allow.
+    /// Whether a spring or a clearance is rigid within the readings.
     pub rigid: bool,
 }
 
@@ -57,11 +57,14 @@ pub struct HeldOut {
 #[derive(Clone, Debug)]
 pub struct Identified {
     /// Estimates, one per parameter, in order.
-    pub parameters: Vec<ParameterEstimate>,
+    pub parameters: Vec<FittedParameter>,
     /// Correlation matrix of the parameters' coordinates, p×p.
     pub correlation: DMatrix<f64>,
     /// Combinations that the readings do not determine: parameter and weight, largest weight first.
     pub untold: Vec<Vec<(usize, f64)>>,
+    /// Parameters that these combinations connect; alone: a parameter that the readings do not
+    /// determine.
+    pub together: Vec<Vec<usize>>,
     /// Search coordinates of the parameters, then the unknowns of the measurements.
     pub unknowns: DVector<f64>,
     /// Solution of the least-squares problem.

@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
+use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, FittedParameter};
 use crate::estimation::least_squares::{
     Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, misfit, solve,
 };
@@ -22,6 +22,8 @@ const SUSPICIOUS: f64 = 4.0;
 const STARTS: usize = 12;
 /// Maximum ratio of posterior to prior deviation of a parameter that the readings determine.
 const LEARNT: f64 = 0.5;
+/// Minimum entry of the projection on the undetermined directions that connects two parameters.
+const CONNECTED: f64 = 0.15;
 /// Normal quantile of a 95 % interval.
 const INTERVAL: f64 = 1.96;
 
@@ -72,7 +74,7 @@ pub fn identify(
     };
     let solution = fit.searched(&unknowns)?;
     let found = fit.summary(&unknowns, solution, before, options.folds);
-    let sound = |p: &ParameterEstimate| p.value.is_finite() && (p.std.is_finite() || !p.identifiable);
+    let sound = |p: &FittedParameter| p.value.is_finite() && (p.std.is_finite() || !p.identifiable);
     match found.parameters.iter().all(sound) {
         true => Ok(found),
         false => Err(IdentifyError::NotFinite),
@@ -264,11 +266,13 @@ impl Fit<'_> {
         let estimate = |(k, parameter): (usize, &Parameter)| {
             estimate(parameter, &unknowns[k], solution.unknowns[k], C[(k, k)].sqrt())
         };
+        let (untold, together) = untold(unknowns, C, p);
         let errors = solution.model_errors.iter().enumerate().filter(|(_, error)| **error > 0.0);
         Identified {
             parameters: parameters.iter().enumerate().map(estimate).collect(),
             correlation,
-            untold: untold(unknowns, C, p),
+            untold,
+            together,
             normalised,
             suspicious,
             misfit: self.misfit(&solution),
@@ -309,7 +313,7 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
 /// Returns the estimate of a parameter.
 ///
 /// * `z`: unknown of the fit; `std`: its posterior standard deviation.
-fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> ParameterEstimate {
+fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> FittedParameter {
     let learnt = unknown.prior.is_none_or(|(_, prior)| std <= LEARNT * prior);
     let above_zero = z - INTERVAL * std > 0.0;
     let identifiable = learnt
@@ -323,7 +327,7 @@ fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> Param
         true => parameter.interval(z - INTERVAL * std, z + INTERVAL * std),
         false => [f64::NAN; 2],
     };
-    ParameterEstimate {
+    FittedParameter {
         name: parameter.name.clone(),
         unit: parameter.unit.clone(),
         initial: parameter.initial,
@@ -336,8 +340,9 @@ fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> Param
 }
 
 /// Returns the directions of the parameters, over their prior deviations, of which the readings
-/// know no more than the prior, as parameters and weights, largest weight first.
-fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> Vec<Vec<(usize, f64)>> {
+/// know no more than the prior, as parameters and weights, largest weight first, and the groups of
+/// parameters that these directions connect.
+fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> (Vec<Vec<(usize, f64)>>, Vec<Vec<usize>>) {
     let std: Vec<f64> = unknowns[..p].iter().map(|unknown| unknown.prior.map_or(1.0, |(_, std)| std)).collect();
     let over = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (std[i] * std[j]));
     let eigen = SymmetricEigen::new(over);
@@ -350,5 +355,26 @@ fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> Vec<Vec<(usize, f
     // At half the variance of the prior, readings and prior know the same.
     let mut none: Vec<usize> = (0..p).filter(|k| eigen.eigenvalues[*k] > 0.5).collect();
     none.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
-    none.into_iter().map(combination).collect()
+    let V = eigen.eigenvectors.select_columns(&none);
+    (none.into_iter().map(combination).collect(), connected(&(&V * V.transpose())))
+}
+
+/// Returns the groups of parameters that a projection on the undetermined directions connects.
+fn connected(P: &DMatrix<f64>) -> Vec<Vec<usize>> {
+    let mut left: Vec<usize> = (0..P.nrows()).filter(|k| P[(*k, *k)] > CONNECTED).collect();
+    let mut groups = Vec::new();
+    while !left.is_empty() {
+        let mut group = vec![left.remove(0)];
+        let mut next = 0;
+        while let Some(&own) = group.get(next) {
+            let (more, rest): (Vec<_>, Vec<_>) = left.into_iter().partition(|k| P[(own, *k)].abs() > CONNECTED);
+            group.extend(more);
+            (left, next) = (rest, next + 1);
+        }
+        if group.len() > 1 || P[(group[0], group[0])] > 0.5 {
+            group.sort_unstable();
+            groups.push(group);
+        }
+    }
+    groups
 }

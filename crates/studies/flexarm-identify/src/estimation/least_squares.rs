@@ -60,9 +60,10 @@ impl Unknown {
 }
 
 /// Loss function of a residual.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Loss {
     /// Square of the residual.
+    #[default]
     Square,
     /// Huber's loss: linear above this number of standard deviations.
     Huber(f64),

@@ -7,12 +7,14 @@
 
 use std::borrow::Cow;
 
-use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench, rotation_vector};
+use flexarm_kinematics::{ElasticAngles, Frame, Pose, SpatialInertia, Wrench, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
 use nalgebra::{DMatrix, DVector, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3, Vector6};
 
 use crate::estimation::least_squares::Residuals;
-use crate::estimation::parameter::{Effect, NominalArm, Parameter, carried_along, displacement, tool_shift};
+use crate::estimation::parameter::{
+    Effect, NominalArm, Parameter, carried_along, displacement, link_change, tool_shift,
+};
 use crate::estimation::reading::{
     Component, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
 };
@@ -149,9 +151,11 @@ impl<'a> Workspaces<'a> {
     }
 
     /// Returns the parameters for an arm that carries a mass at its tool: moving the tool also
-    /// moves that mass. Twists of joint frames are in the axes after all displacements.
+    /// moves that mass. Twists of joint frames are in the axes after all displacements; masses and
+    /// centres of mass of links are linearised at their present values.
     fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
-        if !self.parameters.iter().any(|p| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. })) {
+        let depends = |p: &Parameter| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. } | Effect::Link { .. });
+        if !self.parameters.iter().any(depends) {
             return Cow::Borrowed(self.parameters);
         }
         let (body, X_BF) = (self.nominal.tool.body, self.nominal.tool.X_BF);
@@ -159,7 +163,13 @@ impl<'a> Workspaces<'a> {
         let mut all = self.parameters.to_vec();
         for (k, [v, w]) in tool_twists(self.parameters, &X_BF.rotation, &tool_shift(self.parameters, &self.x).1) {
             let per_kg = carried_along(&I, &X_BF.translation.vector, &v, &w);
-            all[k].effect = Effect::Mass { body, per_kg };
+            all[k].effect = Effect::Mass(vec![(body, per_kg)]);
+        }
+        for (own, old) in all.iter_mut().zip(self.parameters) {
+            if let Effect::Link { parts, .. } = &old.effect {
+                let (factor, shift) = link_change(self.parameters, &self.x, parts);
+                own.effect = Effect::Mass(old.effect.inertia_rates(factor, &shift));
+            }
         }
         for k in 0..all.len() {
             let (before, after) = all.split_at_mut(k);
@@ -471,13 +481,7 @@ fn tool_twists<'a>(
 /// Returns the left Jacobian of a rotation vector: angular velocity (fixed axes) per rate of the
 /// vector.
 fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
-    let angle = v.norm();
-    let K = v.cross_matrix();
-    let (a, b) = match angle < 1e-4 {
-        true => (0.5 - angle * angle / 24.0, 1.0 / 6.0 - angle * angle / 120.0),
-        false => ((1.0 - angle.cos()) / (angle * angle), (angle - angle.sin()) / angle.powi(3)),
-    };
-    nalgebra::Matrix3::identity() + K * a + K * K * b
+    ElasticAngles::RotationVector.pose(v).1.transpose()
 }
 
 impl MeasuredArm<'_> {

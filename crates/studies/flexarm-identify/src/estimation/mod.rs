@@ -10,7 +10,6 @@
 //! Not here: files, units, robots by name (the crate root).
 
 pub(crate) mod bounded;
-mod coupled_gears;
 mod encoders;
 mod identified;
 pub(crate) mod identify;
@@ -24,14 +23,13 @@ mod response;
 mod sensitivity;
 mod slips;
 
-pub use coupled_gears::{CoupledOutput, coupled_gear_stiffness};
-pub use encoders::{GearEstimate, GearRun, gear_stiffness};
-pub use identified::{HeldOut, Identified, IdentifyError, ModelError, ParameterEstimate};
+pub use encoders::{GearEstimate, GearOutput, gear_stiffness};
+pub use identified::{HeldOut, Identified, IdentifyError, ModelError, FittedParameter};
 pub use identify::{IdentifyOptions, identify};
 pub use least_squares::{Loss, Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, solve};
 pub use measurement::{MeasuredArm, NoAnswer};
-pub use parameter::{Effect, NominalArm, Parameter, SpringPart};
-pub use plan::{Candidate, Plan, PlanOptions, plan};
+pub use parameter::{Effect, LinkPart, NominalArm, Parameter, SpringPart};
+pub use plan::{Plan, PlanOptions, plan};
 pub use reading::{
     Component, Form, Instrument, LoadCase, MeasuredResponse, MeasuredShape, Measurements, Reading, ReadingKind, Row,
     Target,

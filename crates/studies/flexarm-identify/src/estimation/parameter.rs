@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Frame, Model, Pose, SpatialInertia};
+use flexarm_kinematics::{Frame, LinkInertia, Model, Pose, SpatialInertia};
 use flexarm_stepping::{Damping, GearCoupling, GuideTerm, Held, Plant, Spring, SpringCurve, StepError};
 use nalgebra::{DMatrix, Matrix3, Rotation3, Translation3, Vector3, Vector6};
 
@@ -29,6 +29,25 @@ pub struct SpringPart {
     pub spring: usize,
     /// One of its coordinates; all of them if `None`.
     pub coordinate: Option<usize>,
+}
+
+/// Part of a link on a body; a rigid link has one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LinkPart {
+    /// Number of the body.
+    pub body: usize,
+    /// Pose of the link's axes in the body.
+    pub X_BL: Pose,
+    /// Initial mass properties of the part, link axes.
+    pub inertia: LinkInertia,
+}
+
+impl LinkPart {
+    /// Returns the inertia about Bo, B axes, with a factor on the mass and a shifted centre of mass.
+    fn spatial(&self, factor: f64, shift: &Vector3<f64>) -> SpatialInertia {
+        let LinkInertia { mass, com, inertia_com } = self.inertia;
+        SpatialInertia::from_com(factor * mass, &(com + shift), &(inertia_com * factor)).at_parent(&self.X_BL)
+    }
 }
 
 /// Effect of a parameter on the arm.
@@ -87,13 +106,55 @@ pub enum Effect {
         /// Usual size of the displacement (m, rad).
         size: f64,
     },
-    /// Mass (kg) on a body, with inertia proportional to it: `per_kg` about Bo, B axes.
-    Mass {
-        /// Number of the body.
-        body: usize,
-        /// Spatial inertia per kilogram.
-        per_kg: SpatialInertia,
+    /// Mass (kg) with inertia proportional to it: per kilogram on each body, about Bo, B axes.
+    Mass(Vec<(usize, SpatialInertia)>),
+    /// Mass of a link (kg) at constant centre of mass and radii of gyration, or a coordinate of its
+    /// centre of mass in link axes (m). Parameters of one link have equal parts.
+    Link {
+        /// Parts of the link.
+        parts: Vec<LinkPart>,
+        /// Axis of the centre of mass, 0 to 2; `None` for the mass.
+        axis: Option<usize>,
+        /// Usual size of an error of the number (kg or m).
+        size: f64,
     },
+}
+
+impl Effect {
+    /// Returns the change of the inertia of bodies per unit of a mass or a centre of mass.
+    ///
+    /// * `factor`, `shift`: present factor on the mass of the link and shift of its centre of mass.
+    pub(crate) fn inertia_rates(&self, factor: f64, shift: &Vector3<f64>) -> Vec<(usize, SpatialInertia)> {
+        match self {
+            Self::Mass(on) => on.clone(),
+            Self::Link { parts, axis, .. } => {
+                let all: f64 = parts.iter().map(|part| part.inertia.mass).sum();
+                let rate = |part: &LinkPart| match axis {
+                    None => scaled(&part.spatial(1.0, shift), 1.0 / all),
+                    Some(axis) => {
+                        let along = part.X_BL.rotation * Vector3::ith(*axis, 1.0);
+                        carried_along(&part.spatial(factor, shift), &Vector3::zeros(), &along, &Vector3::zeros())
+                    }
+                };
+                parts.iter().map(|part| (part.body, rate(part))).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// Returns the factor on the mass of a link and the shift of its centre of mass (m).
+pub(crate) fn link_change(parameters: &[Parameter], x: &[f64], of: &[LinkPart]) -> (f64, Vector3<f64>) {
+    let all: f64 = of.iter().map(|part| part.inertia.mass).sum();
+    let (mut factor, mut shift) = (1.0, Vector3::zeros());
+    for (parameter, x) in parameters.iter().zip(x) {
+        match &parameter.effect {
+            Effect::Link { parts, axis: None, .. } if parts == of => factor += x / all,
+            Effect::Link { parts, axis: Some(axis), .. } if parts == of => shift[*axis] += x,
+            _ => {}
+        }
+    }
+    (factor, shift)
 }
 
 /// Unknown parameter of an arm.
@@ -118,6 +179,8 @@ const COMPLIANCE: f64 = 10.0;
 /// Minimum compliance over its standard deviation: a stiffness beyond it has the effect of a rigid
 /// spring.
 const RIGID: f64 = 1e-6;
+/// Minimum mass of a link over the initial one.
+const LIGHTEST: f64 = 0.01;
 /// Standard deviation of the logarithm of a positive number of known order of magnitude.
 const MAGNITUDE: f64 = std::f64::consts::LN_10;
 
@@ -150,8 +213,8 @@ impl Parameter {
             Effect::Tool(_) => 0.01,
             Effect::Guide { term, .. } if term.is_positive() => std::f64::consts::LN_2,
             Effect::Guide { size, .. } => 0.5 * size,
-            Effect::Frame { size, .. } => *size,
-            Effect::Mass { .. } => (0.5 * self.initial.abs()).max(1.0),
+            Effect::Frame { size, .. } | Effect::Link { size, .. } => *size,
+            Effect::Mass(_) => (0.5 * self.initial.abs()).max(1.0),
         }
     }
 
@@ -173,7 +236,11 @@ impl Parameter {
             };
         }
         let std = if self.is_logarithmic() { MAGNITUDE } else { self.reference() };
-        let lower = if matches!(self.effect, Effect::Mass { .. }) { -self.initial } else { f64::NEG_INFINITY };
+        let lower = match self.effect {
+            Effect::Mass(_) => -self.initial,
+            Effect::Link { axis: None, .. } => (LIGHTEST - 1.0) * self.initial,
+            _ => f64::NEG_INFINITY,
+        };
         Unknown { start: 0.0, prior: Some((0.0, self.prior.unwrap_or(std))), lower }
     }
 
@@ -226,11 +293,11 @@ impl Parameter {
 }
 
 impl NominalArm {
-    /// Returns the plant with parameters at search coordinates `x`.
+    /// Returns the plant with parameters at search coordinates `all`.
     #[must_use]
-    pub fn with(&self, parameters: &[Parameter], x: &[f64]) -> Self {
+    pub fn with(&self, parameters: &[Parameter], all: &[f64]) -> Self {
         let mut nominal = self.clone();
-        for (parameter, x) in parameters.iter().zip(x) {
+        for (k, (parameter, x)) in parameters.iter().zip(all).enumerate() {
             match &parameter.effect {
                 Effect::Stiffness(places) => {
                     for place in places {
@@ -264,10 +331,27 @@ impl NominalArm {
                     let moved = nominal.model.bodies()[*body].X_PJ * displacement(&(twist * *x));
                     Arc::make_mut(&mut nominal.model).set_joint_frame(*body, moved);
                 }
-                Effect::Mass { body, per_kg } => nominal = nominal.carrying(*body, &scaled(per_kg, *x)),
+                Effect::Mass(on) => {
+                    for (body, per_kg) in on {
+                        nominal = nominal.carrying(*body, &scaled(per_kg, *x));
+                    }
+                }
+                Effect::Link { parts, .. } => {
+                    let same =
+                        |other: &Parameter| matches!(&other.effect, Effect::Link { parts: own, .. } if own == parts);
+                    if parameters[..k].iter().any(same) {
+                        continue;
+                    }
+                    let (factor, shift) = link_change(parameters, all, parts);
+                    for part in parts {
+                        let old = scaled(&part.spatial(1.0, &Vector3::zeros()), -1.0);
+                        let new = part.spatial(factor, &shift);
+                        nominal = nominal.carrying(part.body, &old).carrying(part.body, &new);
+                    }
+                }
             }
         }
-        let (p, turn) = tool_shift(parameters, x);
+        let (p, turn) = tool_shift(parameters, all);
         if p != Vector3::zeros() || turn != Vector3::zeros() {
             nominal.tool.X_BF *= Pose::from_parts(Translation3::from(p), Rotation3::new(turn));
         }

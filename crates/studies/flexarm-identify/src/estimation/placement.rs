@@ -6,7 +6,7 @@ use nalgebra::{DVector, Matrix3, Rotation3, Translation3, Vector3};
 use crate::estimation::identified::IdentifyError;
 use crate::estimation::measurement::MeasuredArm;
 use crate::estimation::parameter::NominalArm;
-use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
+use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind};
 
 /// Returns the measurements with each unknown instrument at its best fit to the arm with its
 /// initial values.
@@ -55,14 +55,7 @@ fn both_points(
     measurements: &Measurements,
     some: impl Fn(&Reading) -> bool,
 ) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
-    // With instruments at the identity, predictions are in world axes.
-    let mut seen = measurements.of_readings(|k| some(&measurements.readings[k]));
-    seen.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
-    seen.targets.iter_mut().for_each(|t| {
-        if let Target::Unknown(guess) = t {
-            *t = Target::Known(*guess);
-        }
-    });
+    let seen = measurements.in_world(|k| some(&measurements.readings[k]));
     let arm = MeasuredArm { nominal, parameters: &[], measurements: &seen };
     Ok([points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())])
 }

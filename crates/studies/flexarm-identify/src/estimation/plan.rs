@@ -12,10 +12,6 @@ use crate::estimation::measurement::{MeasuredArm, NoAnswer};
 use crate::estimation::parameter::{NominalArm, Parameter};
 use crate::estimation::reading::{Measurements, Reading};
 
-/// Candidate: a reading with its expected deviations; its values are ignored.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Candidate(pub Reading);
-
 /// Options of a plan.
 #[derive(Clone, Debug, Default)]
 pub struct PlanOptions {
@@ -24,8 +20,6 @@ pub struct PlanOptions {
     /// Readings whose predicted numbers should have minimum variance, each relative to its
     /// deviation; if empty, the determinant is maximised.
     pub purpose: Vec<Reading>,
-    /// Whether a candidate may be chosen more than once.
-    pub repeat: bool,
 }
 
 /// Plan of measurements.
@@ -66,24 +60,25 @@ fn prior(parameter: &Parameter) -> f64 {
 
 /// Chooses readings among candidates.
 ///
-/// Candidates for which the arm has no solution are skipped.
+/// * `candidates`: readings with their expected deviations; their values are ignored. Those for which
+///   the arm has no solution are skipped.
 ///
 /// # Errors
 /// [`NoAnswer`] if the arm has no solution for a reading of the purpose.
 pub fn plan(
     nominal: &NominalArm,
     parameters: &[Parameter],
-    candidates: &[Candidate],
+    candidates: &[Reading],
     options: &PlanOptions,
 ) -> Result<Plan, NoAnswer> {
     let p = parameters.len();
     let rows: Vec<Option<DMatrix<f64>>> = candidates
         .iter()
-        .map(|candidate| rows_of(nominal, parameters, &candidate.0).ok().filter(|J| J.iter().all(|x| x.is_finite())))
+        .map(|candidate| rows_of(nominal, parameters, candidate).ok().filter(|J| J.iter().all(|x| x.is_finite())))
         .collect();
     let purpose =
         options.purpose.iter().map(|reading| rows_of(nominal, parameters, reading)).collect::<Result<Vec<_>, _>>()?;
-    let mut search = Choice { rows: &rows, purpose: &purpose, repeat: options.repeat, chosen: Vec::new() };
+    let mut search = Choice { rows: &rows, purpose: &purpose, chosen: Vec::new() };
     let mut information = DMatrix::identity(p, p);
     // Greedy selection, then exchange.
     while search.chosen.len() < options.count {
@@ -115,7 +110,6 @@ fn log_determinant(information: &DMatrix<f64>) -> f64 {
 struct Choice<'a> {
     rows: &'a [Option<DMatrix<f64>>],
     purpose: &'a [DMatrix<f64>],
-    repeat: bool,
     chosen: Vec<usize>,
 }
 
@@ -139,7 +133,7 @@ impl Choice<'_> {
     fn best(&self, information: &DMatrix<f64>) -> Option<usize> {
         let mut best: Option<(usize, f64)> = None;
         for number in 0..self.rows.len() {
-            if self.rows[number].is_none() || (!self.repeat && self.chosen.contains(&number)) {
+            if self.rows[number].is_none() || self.chosen.contains(&number) {
                 continue;
             }
             let mut with = information.clone();

@@ -386,6 +386,19 @@ impl Measurements {
         Self { readings, ..self.clone() }
     }
 
+    /// Returns a copy with some of the readings, instruments at the world's origin and targets at their
+    /// initial guess.
+    pub(crate) fn in_world(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut some = self.of_readings(keep);
+        some.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
+        some.targets.iter_mut().for_each(|t| {
+            if let Target::Unknown(guess) = t {
+                *t = Target::Known(*guess);
+            }
+        });
+        some
+    }
+
     /// Returns a copy that compares all responses by their logarithm; `None` if all of them are
     /// already compared so.
     pub(crate) fn logarithmic(&self) -> Option<Self> {

@@ -265,11 +265,7 @@ impl Damped<'_> {
                     let own = *spring == number && self.plant.coupled_damping_slope(number).is_none();
                     damper = own.then_some(*coordinate);
                 }
-                Effect::Guide { .. }
-                | Effect::Frame { .. }
-                | Effect::Entry { .. }
-                | Effect::Tool(_)
-                | Effect::Mass { .. } => {}
+                _ => {}
             }
             let first = self.plant.offset(e);
             SpringSlope { first, size: e.size, K: e.K.clone(), dK, damping: e.damping, more, damper }

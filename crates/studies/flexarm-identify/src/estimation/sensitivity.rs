@@ -10,13 +10,11 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, Frame, Twist, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{Guide, GuideTerm, OperatingPoint, Plant, SpringCurve, StepError, Tangents};
-use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, SymmetricEigen, Vector3, Vector6};
+use flexarm_kinematics::{Frame, SpatialInertia, Twist, Wrench, rotation_vector};
+use flexarm_stepping::{Guide, GuideTerm, OperatingPoint, Plant, SpringCurve, StepError, Tangents, modes_of};
+use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX, Vector3, Vector6};
 
-use crate::estimation::parameter::{
-    Effect, NominalArm, Parameter, SpringPart, displacement, entry_slope, scaled, slope_of,
-};
+use crate::estimation::parameter::{Effect, NominalArm, Parameter, SpringPart, displacement, entry_slope, slope_of};
 
 /// Step of the central differences over displacements of joint frames (m, rad): the error is of the
 /// order of its square.
@@ -40,7 +38,6 @@ pub(crate) fn slopes_at_rest(
     parameters: &[Parameter],
     frame: &Frame,
 ) -> (DMatrix<f64>, Matrix6xX<f64>) {
-    let n = at.deflections().len();
     let (mut slopes, rigid) = frame_slopes(at, parameters, frame);
     for (k, parameter) in parameters.iter().enumerate() {
         match &parameter.effect {
@@ -70,14 +67,10 @@ pub(crate) fn slopes_at_rest(
                 }
             }
             Effect::Frame { .. } => {}
-            Effect::Mass { body, per_kg } => {
-                // Forces are linear in a mass: a difference of any size is exact.
-                let (mut with, mut without) = (DVector::zeros(n), DVector::zeros(n));
-                let plant = at.plant().clone();
-                let heavier = carrying(&plant, *body, per_kg);
-                at.forces_of(&heavier, &mut with);
-                at.forces_of(&plant, &mut without);
-                slopes.set_column(k, &(with - without));
+            effect @ (Effect::Mass(_) | Effect::Link { .. }) => {
+                for (body, rate) in effect.inertia_rates(1.0, &Vector3::zeros()) {
+                    at.add_weight(body, &rate, slopes.column_mut(k).as_mut_slice());
+                }
             }
         }
     }
@@ -107,13 +100,6 @@ fn stiffness_forces(at: &OperatingPoint, place: &SpringPart) -> Vec<(usize, f64)
 /// Returns the change of a guide's number per unit of its search coordinate.
 fn per_unit(guide: &Guide, term: GuideTerm) -> f64 {
     if term.is_positive() { guide.number(term) } else { 1.0 }
-}
-
-/// Returns the arm with one kilogram added.
-fn carrying(plant: &Plant, body: usize, per_kg: &flexarm_kinematics::SpatialInertia) -> Plant {
-    let mut inertia = plant.model.bodies()[body].inertia;
-    inertia += scaled(per_kg, 1.0);
-    plant.with_inertia(body, inertia)
 }
 
 /// Computes the derivatives of the tool pose as twists (world axes, at the tool's origin; m, rad)
@@ -162,8 +148,8 @@ fn frame_slopes(at: &mut OperatingPoint, parameters: &[Parameter], frame: &Frame
     (forces, twists)
 }
 
-/// Computes the derivatives of [`frame_slopes`] for arms with closed loops, balancers or
-/// load-dependent stiffness by central differences.
+/// Computes the derivatives of [`frame_slopes`] for arms with balancers or load-dependent stiffness by
+/// central differences.
 fn frame_differences(
     at: &mut OperatingPoint,
     parameters: &[Parameter],
@@ -173,7 +159,6 @@ fn frame_differences(
 ) {
     let n = at.deflections().len();
     let mut plant = at.plant().clone();
-    let mut data = Data::new(&plant.model);
     let mut moved = [DVector::zeros(n), DVector::zeros(n)];
     for &k in some {
         let Effect::Frame { body, twist, .. } = &parameters[k].effect else { continue };
@@ -181,8 +166,7 @@ fn frame_differences(
         let [behind, ahead] = [-FRAME_STEP, FRAME_STEP].map(|step| {
             Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ * displacement(&(twist * step)));
             at.forces_of(&plant, &mut moved[usize::from(step > 0.0)]);
-            forward_kinematics(&plant.model, &mut data, at.coordinates());
-            data.X_WF(frame)
+            at.pose_of(frame)
         });
         Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ);
         forces.set_column(k, &((&moved[1] - &moved[0]) / (2.0 * FRAME_STEP)));
@@ -262,28 +246,8 @@ pub fn frequency_slopes(
 
 /// Squares of the natural frequencies, ascending, and mode shapes with `φᵀ M φ = 1`.
 pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
-    let singular = |matrix| StepError::Singular { matrix, t: 0.0 };
-    let K = (&at.K + at.K.transpose()) * 0.5;
-    let L = K.cholesky().ok_or_else(|| singular("static stiffness (with the effect of weight)"))?.unpack();
-    let lower = |B: &DMatrix<f64>| L.solve_lower_triangular(B).ok_or_else(|| singular("stiffness factor"));
-    let A = lower(&lower(&at.M)?.transpose())?;
-    let eigen = SymmetricEigen::new((&A + A.transpose()) * 0.5);
-    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
-    order.sort_by(|i, j| eigen.eigenvalues[*j].total_cmp(&eigen.eigenvalues[*i]));
-    let mut shapes = DMatrix::zeros(order.len(), order.len());
-    let mut omega2 = Vec::with_capacity(order.len());
-    for (column, k) in order.into_iter().enumerate() {
-        let value = eigen.eigenvalues[k];
-        if value.is_nan() || value <= 0.0 {
-            return Err(singular("mass matrix of the elastic coordinates"));
-        }
-        // K φ = ω² M φ with φ = L^-T y, and φᵀ M φ = yᵀ A y = value.
-        let y = eigen.eigenvectors.column(k).into_owned();
-        let phi = L.tr_solve_lower_triangular(&y).ok_or_else(|| singular("stiffness factor"))? / value.sqrt();
-        shapes.set_column(column, &phi);
-        omega2.push(1.0 / value);
-    }
-    Ok((omega2, shapes))
+    let modes = modes_of(&((&at.K + at.K.transpose()) * 0.5), &at.M, 0.0)?;
+    Ok((modes.omega.iter().map(|omega| omega * omega).collect(), modes.shapes))
 }
 
 /// Computes the derivative of matrices that depend on the coordinates, as the elastic coordinates
@@ -402,8 +366,15 @@ pub(crate) fn explicit(
             let [ahead, behind] = frames_beside(plant, *body, twist).map(|plant| Tangents::at(&plant, tool, F_T_W, q));
             ((ahead.K - behind.K) / (2.0 * FRAME_STEP), (ahead.M - behind.M) / (2.0 * FRAME_STEP))
         }
-        Effect::Mass { body, per_kg } => {
-            let heavier = Tangents::at(&carrying(plant, *body, per_kg), tool, F_T_W, q);
+        Effect::Mass(_) | Effect::Link { .. } => {
+            // Linear in the inertias: a difference of any size is exact.
+            let add = |plant: Plant, (body, rate): (usize, SpatialInertia)| {
+                let mut inertia = plant.model.bodies()[body].inertia;
+                inertia += rate;
+                plant.with_inertia(body, inertia)
+            };
+            let heavier = effect.inertia_rates(1.0, &Vector3::zeros()).into_iter().fold(plant.clone(), add);
+            let heavier = Tangents::at(&heavier, tool, F_T_W, q);
             (heavier.K - &here.K, heavier.M - &here.M)
         }
     }

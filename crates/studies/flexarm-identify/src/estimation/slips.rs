@@ -10,14 +10,13 @@
 //! compliances explain, whatever the initial stiffnesses are. A mistake is reported if the residual
 //! is large and another order or other axes reduce it to almost nothing.
 
-use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Rotation3, Vector3};
 
 use crate::estimation::least_squares::Residuals;
 use crate::estimation::measurement::MeasuredArm;
 use crate::estimation::parameter::{Effect, NominalArm, Parameter};
 use crate::estimation::placement::{points, rigid_fit, rotation_fit};
-use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind, Target};
+use crate::estimation::reading::{Component, Measurements, Reading, ReadingKind};
 
 /// Mistake that explains readings which the arm does not.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,20 +108,12 @@ fn one_joint(nominal: &NominalArm, placed: &Measurements, slides: &[bool]) -> Op
     scored.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Selects some readings at equal intervals, with instruments at the world's origin and targets at
-/// their initial guess.
+/// Selects some readings at equal intervals, in world axes.
 fn some_of(measurements: &Measurements, some: impl Fn(&Reading) -> bool) -> Measurements {
     let all: Vec<usize> = (0..measurements.readings.len()).filter(|k| some(&measurements.readings[*k])).collect();
     let every = all.len().div_ceil(MAX_READINGS).max(1);
     let kept: Vec<usize> = all.into_iter().step_by(every).collect();
-    let mut few = measurements.of_readings(|k| kept.contains(&k));
-    few.instruments.iter_mut().for_each(|i| *i = Instrument::Known(Pose::identity()));
-    few.targets.iter_mut().for_each(|t| {
-        if let Target::Unknown(guess) = t {
-            *t = Target::Known(*guess);
-        }
-    });
-    few
+    measurements.in_world(|k| kept.contains(&k))
 }
 
 /// Returns the readings with permuted joint values.

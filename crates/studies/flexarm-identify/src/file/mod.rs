@@ -81,7 +81,7 @@ struct ParameterEntry {
 }
 
 /// Contents of the file in SI units.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct MeasurementInput {
     pub(super) measurements: Measurements,
     pub(super) recordings: Vec<EncoderRecording>,
