@@ -22,7 +22,7 @@ fn class(error: &Error) -> &'static str {
         Error::Limits { .. } => "LimitsError",
         Error::Value(_) => "SettingError",
         Error::Modelling(_) => "ModellingError",
-        Error::Pose(_) | Error::Loop(_) => "PoseError",
+        Error::Pose(_) | Error::Loop { .. } => "PoseError",
         Error::Load(_) => "LoadError",
         Error::External(_) => class_of_study(error),
         Error::Recording(_) => "RecordingError",

@@ -199,7 +199,7 @@ pub mod recordings {
 
 /// Flexible links from meshes and from matrices of other programs.
 pub mod links {
-    pub use flexarm_linkmaker::{JobError, LinkError, WordError, export, import};
+    pub use flexarm_linkmaker::{LinkError, WordError, export, import};
     pub use flexarm_run::reduce;
 }
 
@@ -214,8 +214,7 @@ pub mod errors {
     pub use flexarm_kinematics::BalancerCurveError;
     pub use flexarm_motion_io::MotionError;
     pub use flexarm_new::NewError;
-    pub use flexarm_path::PathError;
-    pub use flexarm_run::{LoopError, RecordingError, RobotFileError};
+    pub use flexarm_run::{RecordingError, RobotFileError};
     pub use flexarm_stepping::StepError;
     pub use flexarm_trajectory::{ColumnMapError, TrajectoryError};
 }

@@ -135,8 +135,7 @@ fn load_findings(cause: Error, path: &Path, findings: &mut Vec<Finding>) {
         Error::Several(errors) => errors.into_iter().for_each(|cause| load_findings(cause, path, findings)),
         Error::Urdf(cause) => findings.extend(cause.into_findings()),
         Error::RobotFile(e) => {
-            let location = format!("{}:{}:{}", e.path.display(), e.line, e.column);
-            findings.push(error("robot-file", location, &e.message));
+            findings.push(error("robot-file", e.place().to_string(), &e.message));
         }
         Error::File { path, what } => findings.push(error("missing-file", path.display().to_string(), &what)),
         Error::Flex(cause) => findings.push(error("reduced-link", file, &cause)),

@@ -5,7 +5,6 @@
 //! ([`flexarm_settings::name_settings`]). The treatment of an error, such as the exit code of a
 //! process, is up to the interface.
 
-mod loops;
 mod picture;
 mod recording;
 
@@ -13,10 +12,9 @@ use std::path::PathBuf;
 
 use flexarm_files::{FileError, TextFileError as RobotFileError};
 use flexarm_linkmaker::LinkError;
-use flexarm_settings::{OutOfRange, Setting, known_names};
+use flexarm_settings::{Finding, OutOfRange, Setting, known_names};
 
 pub use flexarm_settings::Fault;
-pub use loops::LoopError;
 pub(crate) use picture::NoPicture;
 pub use recording::RecordingError;
 
@@ -75,12 +73,10 @@ pub enum Error {
     #[error(transparent)]
     Program(#[from] Box<flexarm_programs::ProgramError>),
     /// The arm cannot follow a TCP path.
-    #[error("{}: {source}{}", path.display(), assumed(notes))]
+    #[error("{finding}{}", assumed(notes))]
     Path {
-        /// Path of the motion.
-        path: PathBuf,
-        /// Location and cause.
-        source: Box<flexarm_path::PathError>,
+        /// Place and cause.
+        finding: Box<Finding>,
         /// Assumptions made before.
         notes: Vec<String>,
     },
@@ -121,8 +117,13 @@ pub enum Error {
     #[error("{0}")]
     Pose(String),
     /// A closed loop does not fit the robot, or does not close at a pose.
-    #[error(transparent)]
-    Loop(#[from] LoopError),
+    #[error("loop {name:?}: {what}")]
+    Loop {
+        /// Name of the loop.
+        name: String,
+        /// Cause and remedy, with the time of a motion.
+        what: String,
+    },
     /// A load or a change of payload is invalid: what was found, what was expected and the remedy.
     #[error("{0}")]
     Load(String),

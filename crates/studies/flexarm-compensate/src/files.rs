@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_log::RecordingFormat;
+use flexarm_settings::Place;
 
 use super::program::{self, Corrected, ProgramFigures};
 use super::{CompensateRequest, Compensation, MotionPair, SAMPLE_S, page};
@@ -65,9 +66,9 @@ impl Files {
         let ProgramFigures { targets, corrected: done, left, residual_m, .. } = &corrected.figures;
         if let (true, Some(first)) = (done < targets, left.first()) {
             let text = format!(
-                "{} of {targets} targets of the program are unchanged, the first in line {} ({}): {}",
+                "{} of {targets} targets of the program are unchanged, the first at {} ({}): {}",
                 targets - done,
-                first.line,
+                Place::of_file(place[0].display()).line(first.line),
                 first.statement,
                 first.why
             );

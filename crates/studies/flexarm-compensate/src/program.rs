@@ -14,6 +14,7 @@ use flexarm_kinematics::{
 use flexarm_path::program::{Item, Move, MoveKind, Target};
 use flexarm_path::{PathOptions, ProgramArm, base_of, target_at, target_joints, tool_of};
 use flexarm_programs::{NewTarget, ProgramText};
+use flexarm_settings::Place;
 use flexarm_stepping::{Held, InertiaChange, Plant, StepError, TargetError, linearise, static_targets};
 use nalgebra::{DVector, Translation3, Vector3, Vector6};
 use rayon::prelude::*;
@@ -131,7 +132,7 @@ pub(super) fn corrected(
     let understood = |bytes: &[u8], others: Vec<(PathBuf, Vec<u8>)>| -> Result<Understood, Error> {
         let text = program_text(path, bytes, &controller, others)?;
         let places = target_joints(&text.program, &controller, &PathOptions::default());
-        let failed = |source| Error::Path { path: path.clone(), source: Box::new(source), notes: Vec::new() };
+        let failed = |finding| Error::Path { finding, notes: Vec::new() };
         Ok(Understood { places: places.map_err(failed)?, text })
     };
     let old = understood(&flexarm_trajectory::bytes_of_file(path)?, Vec::new())?;
@@ -180,7 +181,7 @@ fn stops<'a>(program: &'a Understood, scenario: &Scenario) -> Vec<Stop<'a>> {
     let mut stops = Vec::new();
     for (item, (what, q)) in program.text.program.items.iter().zip(&program.places).enumerate() {
         let (Item::Move(of), Some(q)) = (what, q) else { continue };
-        let leg = planned.get(next).filter(|leg| leg.line == of.line && leg.statement == of.statement);
+        let leg = planned.get(next).filter(|leg| leg.place == of.place && leg.statement == of.statement);
         if let Some(leg) = leg {
             next += 1;
             let end = planned.get(next).map_or_else(|| scenario.duration_s(), |leg| leg.span_s[0]);
@@ -214,7 +215,7 @@ fn judged(
                 figures.residual_rad = figures.residual_rad.max(size(&after, 3));
             }
             Some((_, why)) if figures.left.len() < NAMED => figures.left.push(LeftTarget {
-                line: stop.of.line,
+                line: stop.of.place.line.unwrap_or(0),
                 statement: stop.of.statement.clone(),
                 why: why.clone(),
                 residual_m: size(&after, 0),
@@ -253,11 +254,11 @@ fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<
             "targets passed without a stop: {passed}; they are corrected for the loads at the time of passing"
         ));
     }
-    let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, stop.of.line)));
-    let changing: Vec<(f64, usize)> = changing.filter(|(change, _)| *change > CHANGES).collect();
-    if let Some((worst, line)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+    let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, &stop.of.place)));
+    let changing: Vec<(f64, &Place)> = changing.filter(|(change, _)| *change > CHANGES).collect();
+    if let Some((worst, place)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
         notes.push(format!(
-            "at {} targets the loads change while the arm is there, most in line {line} (up to {:.0} % of the \
+            "at {} targets the loads change while the arm is there, most at {place} (up to {:.0} % of the \
              maximum from the mean): the correction uses the mean load",
             changing.len(),
             100.0 * worst

@@ -302,8 +302,7 @@ pub fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
     let places: Places = toml::from_str(text).map_err(failed)?;
     for (entry, place) in job.interface.iter_mut().zip(places.interface) {
         let span = place.select.or(place.name).map_or(0..0, |value| value.span());
-        let at = source.error(span, "");
-        entry.place = format!("{}:{}:{}", path.display(), at.line, at.column);
+        entry.place = source.error(span, "").place().to_string();
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     job.file = Some(path.to_owned());

@@ -253,7 +253,7 @@ fn robot_program(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
 }
 
 fn along((trajectory, tool_path): (Trajectory, ToolPath), format: String) -> ReadMotion {
-    let (samples, caveats) = (None, tool_path.caveats());
+    let (samples, caveats) = (None, tool_path.caveats.clone());
     ReadMotion { trajectory, format, topic: None, samples, dropped: Vec::new(), caveats, tool_path: Some(tool_path) }
 }
 
