@@ -1,7 +1,6 @@
 //! Errors of making or exporting a link, with cause and numbers, and whether the input or the run
 //! is at fault.
 
-mod job;
 mod word;
 
 use std::path::PathBuf;
@@ -12,7 +11,6 @@ use flexarm_fem::sparse::ModesError;
 use flexarm_files::{FileError, TextFileError};
 use flexarm_settings::Fault;
 
-pub use job::JobError;
 pub use word::WordError;
 
 /// An error of making or exporting a link.
@@ -28,12 +26,9 @@ pub enum LinkError {
     /// Several errors of one job.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<LinkError>),
-    /// An invalid number or name in a job.
-    #[error(transparent)]
-    Job(#[from] JobError),
-    /// No file of an import, or interface frames that do not match its matrices.
+    /// A number or name of a job is invalid or missing: what was found and what is expected.
     #[error("{0}")]
-    ImportJob(String),
+    Job(String),
     /// An invalid reduced-link file.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),

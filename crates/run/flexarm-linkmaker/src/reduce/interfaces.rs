@@ -189,7 +189,7 @@ impl MeshFrame<'_> {
                     let (urdf, link) = (Setting::Urdf, Setting::Link);
                     fail(format!("joint {joint:?} needs a robot: {urdf} FILE {link} NAME, or [urdf] in the job file"))
                 })?;
-                robot.joint(joint).map_err(|error| fail(error.to_string()))?
+                robot.joint(joint).map_err(fail)?
             }
             (None, None, None) => match (robot, index) {
                 (Some(_), 0) => Pose::identity(),

@@ -19,7 +19,7 @@ use super::summary::{MaterialFigures, RegionFigures};
 use super::urdf_link::UrdfLink;
 use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
 use super::{JUDGED_MODES, MAX_MODES, MODES};
-use crate::{JobError, LinkError, stamp};
+use crate::{LinkError, stamp};
 
 /// Input of a reduction.
 pub(super) struct Prepared {
@@ -68,7 +68,11 @@ pub(super) fn prepare(
     }
     let materials = materials(job, &mut file, &mut faults, &mut warnings);
     if job.link_name().trim().is_empty() || job.link_name().contains(['/', '\\', '\n']) {
-        faults.push(JobError::LinkName(job.link_name()).into());
+        faults.push(LinkError::Job(format!(
+            "{:?} is not a valid link name: use one that can be part of a file name ({})",
+            job.link_name(),
+            Setting::Name
+        )));
     }
     // The reader's warning about a deck without sections does not apply if the job has the
     // material.
@@ -102,8 +106,7 @@ pub(super) fn prepare(
         let mesh =
             mass_properties(&file.mesh, &densities).map_err(|error| LinkError::file(&job.mesh, error.to_string()))?;
         let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
-        plan.attached =
-            robot.rest(&mesh, &along).map_err(|error| LinkError::file(&entry.file, error.to_string()))?.into();
+        plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::file(&entry.file, what))?.into();
     }
     Ok(Prepared { plan, file, units, chosen, materials, doubts })
 }
@@ -111,7 +114,8 @@ pub(super) fn prepare(
 /// Merges coincident nodes.
 fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut Vec<String>) -> Result<(), LinkError> {
     if !(distance.is_finite() && distance >= 0.0) {
-        return Err(JobError::MergeDistance(distance).into());
+        let what = format!("merge = {distance}: a distance of zero or more, in the unit of the mesh");
+        return Err(LinkError::Job(what));
     }
     let merged = file.mesh.merge_coincident(distance * units.length);
     let before = file.mesh.nodes.len();
