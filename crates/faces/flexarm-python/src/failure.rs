@@ -16,6 +16,8 @@ fn class(error: &Error) -> &'static str {
         Error::File { .. } | Error::Taken { .. } => "FileError",
         Error::InStudy { source, .. } => class(source),
         Error::Several(faults) => faults.first().map_or("InputError", class),
+        // Tables of numbers have no page of their own.
+        Error::RobotFile(fault) if fault.page.is_empty() => "FileError",
         Error::RobotFile(_) | Error::Flex(_) | Error::NoTcp { .. } | Error::UnknownTcp { .. } => "RobotError",
         Error::Urdf(_) | Error::Model { .. } => "UrdfError",
         Error::Trajectory(_) | Error::Program(_) | Error::Path { .. } | Error::Motion(_) => "MotionError",

@@ -212,7 +212,6 @@ pub mod files {
 pub mod errors {
     pub use flexarm_files::FileError;
     pub use flexarm_kinematics::BalancerCurveError;
-    pub use flexarm_motion_io::MotionError;
     pub use flexarm_new::NewError;
     pub use flexarm_run::{RecordingError, RobotFileError};
     pub use flexarm_stepping::StepError;

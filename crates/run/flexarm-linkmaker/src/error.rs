@@ -3,7 +3,7 @@
 
 mod word;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexarm_fem::mesh_link::MeshLinkError;
 use flexarm_fem::reduction::ReductionError;
@@ -26,7 +26,8 @@ pub enum LinkError {
     /// Several errors of one job.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<LinkError>),
-    /// A number or name of a job is invalid or missing: what was found and what is expected.
+    /// A number or name of a job is invalid or missing, or a file does not hold the data that a job
+    /// needs: what was found and what is expected.
     #[error("{0}")]
     Job(String),
     /// An invalid reduced-link file.
@@ -70,8 +71,8 @@ pub enum LinkError {
 
 impl LinkError {
     /// Error for a file that does not hold the required data.
-    pub(crate) fn file(path: impl Into<PathBuf>, what: impl Into<String>) -> Self {
-        Self::Files(FileError::Unusable { path: path.into(), what: what.into() })
+    pub(crate) fn content(path: impl AsRef<Path>, what: impl std::fmt::Display) -> Self {
+        Self::Job(format!("{}: {what}", path.as_ref().display()))
     }
 
     /// Returns a single error as it is, several as [`LinkError::Several`].

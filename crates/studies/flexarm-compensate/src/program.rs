@@ -20,7 +20,7 @@ use nalgebra::{DVector, Translation3, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::CompensateRequest;
+use super::{CompensateError, CompensateRequest};
 use super::job::averaged;
 use flexarm_run::tool_path::{Cell, Overrides, program_text};
 use flexarm_run::{AppliedLoad, Arm, Error, Motion, Robot, Scenario};
@@ -157,11 +157,11 @@ pub(super) fn corrected(
 
     // Interpret the written text as the controller will.
     let [(_, main), others @ ..] = &rewritten.files[..] else {
-        return Err(Error::File { path: path.clone(), what: "the program has no text".into() });
+        return Err(CompensateError::Input(format!("{}: the program has no text", path.display())).into());
     };
     let again = understood(main, others.to_vec())?;
     let judged = judged(&rest, &stops, &again.places, &left)
-        .map_err(|error| Error::File { path: path.clone(), what: error.to_string() })?;
+        .map_err(|error| CompensateError::Input(format!("{}: {error}", path.display())))?;
     let figures = ProgramFigures {
         files: rewritten.files.iter().map(|(file, _)| in_folder(folder, file).display().to_string()).collect(),
         corrected: rewritten.replaced.len(),

@@ -174,7 +174,7 @@ fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(
         found.name(),
         Setting::MatrixFormat
     );
-    Err(LinkError::file(origin, what))
+    Err(LinkError::content(origin, what))
 }
 
 /// What an import needs beside the matrices, from the job or else from the files.
@@ -399,8 +399,8 @@ fn rotation(rpy: &Vector3<f64>) -> Rotation3<f64> {
     Rotation3::from_euler_angles(rpy.x, rpy.y, rpy.z)
 }
 
-fn file_error(imported: &ImportedMatrices, what: impl Into<String>) -> LinkError {
-    LinkError::file(&imported.origin, what)
+fn file_error(imported: &ImportedMatrices, what: impl std::fmt::Display) -> LinkError {
+    LinkError::content(&imported.origin, what)
 }
 
 /// Frame of an interface, in the unit of the file.

@@ -40,7 +40,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     let p = |k: usize| places[k].translation.vector;
     let frame = |k: usize| InterfaceFrame { name: nodes[k].0.clone(), X_LI: places[k], tie: None };
     let K = static_stiffness(&sid, [nodes[0].1, nodes[1].1], &R_LM, &(p(1) - p(0)))
-        .map_err(|what| LinkError::file(&file.origin, what))?;
+        .map_err(|what| LinkError::content(&file.origin, what))?;
     let element = Superelement { interfaces: vec![frame(0), frame(1)], K, M: DMatrix::zeros(12, 12) };
     let kind = if modal.is_some() { "modal link" } else { "static part" };
     let method = format!("{kind} of {} modes", sid.nq());
@@ -76,7 +76,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
 
 /// Returns the units of the file, and names and indices of the nodes, proximal and distal first.
 fn layout(job: &ImportJob, origin: &str, ids: &[i64]) -> Result<(UnitSystem, Vec<(String, usize)>), LinkError> {
-    let refuse = |what: String| LinkError::file(origin, what);
+    let refuse = |what: String| LinkError::content(origin, what);
     let mut faults = Vec::new();
     if job.units.is_none() {
         let units = Setting::Units;

@@ -133,7 +133,7 @@ impl MeshFrame<'_> {
                 interface = Setting::Interface,
                 sets = self.known_sets()
             );
-            faults.push(LinkError::file(&job.mesh, what));
+            faults.push(LinkError::content(&job.mesh, what));
         }
         let surface = Surface::new(self.mesh);
         for (index, entry) in job.interface.iter().enumerate() {

@@ -57,7 +57,7 @@ pub(super) fn prepare(
 ) -> Result<Prepared, LinkError> {
     if let Some(entry) = job.urdf.as_ref().filter(|_| robot.is_none()) {
         let what = "is the robot file of the job: its data for the link are required";
-        return Err(LinkError::file(&entry.file, what));
+        return Err(LinkError::content(&entry.file, what));
     }
     let units = units_of(job);
     let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| pose(&frame, units.length));
@@ -88,7 +88,7 @@ pub(super) fn prepare(
     {
         let names = [&a.interface.name, &b.interface.name];
         let what = format!("interfaces {names:?} are at the same point; a link needs a length");
-        faults.push(LinkError::file(&job.mesh, what));
+        faults.push(LinkError::content(&job.mesh, what));
     }
     if !faults.is_empty() {
         return Err(LinkError::of_all(faults));
@@ -104,9 +104,9 @@ pub(super) fn prepare(
     if let (Some(robot), Some(entry)) = (robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
         let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
         let mesh =
-            mass_properties(&file.mesh, &densities).map_err(|error| LinkError::file(&job.mesh, error.to_string()))?;
+            mass_properties(&file.mesh, &densities).map_err(|error| LinkError::content(&job.mesh, error.to_string()))?;
         let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
-        plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::file(&entry.file, what))?.into();
+        plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::content(&entry.file, what))?.into();
     }
     Ok(Prepared { plan, file, units, chosen, materials, doubts })
 }
@@ -152,7 +152,7 @@ fn no_units(job: &ReduceJob, file: &MeshFile) -> LinkError {
         1e-3 * size,
         setting = Setting::Units
     );
-    LinkError::file(&job.mesh, what)
+    LinkError::content(&job.mesh, what)
 }
 
 /// Assigns the materials of the job to the mesh; returns the material of each region.
@@ -162,7 +162,7 @@ fn materials(
     faults: &mut Vec<LinkError>,
     warnings: &mut Vec<String>,
 ) -> Vec<RegionFigures> {
-    let fault = |what: String| LinkError::file(&job.mesh, what);
+    let fault = |what: String| LinkError::content(&job.mesh, what);
     let mesh = &mut file.mesh;
     let names: Vec<&str> = mesh.regions.iter().map(|region| region.name.as_str()).collect();
     for name in job.materials.keys().filter(|name| !names.contains(&name.as_str())) {
@@ -299,7 +299,7 @@ fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, LinkError>
             let what = "the deck has C3D8I as well as C3D8 or C3D8R; the rules of CalculiX are available for \
                         bricks of one type only: use one type for all bricks, or omit quadrature, which gives all \
                         bricks incompatible modes";
-            Err(LinkError::file(&job.mesh, what))
+            Err(LinkError::content(&job.mesh, what))
         }
         QuadratureChoice::Calculix if has("C3D8I") => Ok(Quadrature::CalculixModes),
         QuadratureChoice::Calculix => Ok(Quadrature::Calculix),

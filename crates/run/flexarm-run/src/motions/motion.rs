@@ -177,7 +177,7 @@ impl Motion {
         let moved: Vec<String> = trajectory.joints().iter().chain(trajectory.dropped_columns()).cloned().collect();
         refuse_dependent(path, &moved, &names, &dependent)?;
         let dropped = foreign_joints(trajectory.joints(), &names)
-            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+            .map_err(|e| Error::motion(path, e.to_string()))?;
         let trajectory = trajectory.without_joints(&dropped);
         let warnings = warnings(&trajectory, path);
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
@@ -191,7 +191,7 @@ impl Motion {
         let trajectory = trajectory.with_held_joints(&named_held)?;
         let trajectory = trajectory
             .with_joint_order(&names)
-            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+            .map_err(|e| Error::motion(path, e.to_string()))?;
         let violations = trajectory.check_limits(&limits);
         let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());

@@ -309,10 +309,8 @@ fn placed(robot: &Robot, links: &[LinkStress]) -> Result<Vec<PlacedGauge>, Error
             Ok::<_, StressError>((site, strain.transpose()?))
         };
         let entry = if gauge.grid.is_some() { "strain_gauge" } else { "stress_point" };
-        let (site, strain) = place().map_err(|error| Error::File {
-            path: robot.path.clone(),
-            what: format!("{entry} {:?}: {error}", gauge.name),
-        })?;
+        let (site, strain) =
+            place().map_err(|error| unusable(&robot.path, format_args!("{entry} {:?}: {error}", gauge.name)))?;
         gauges.push(PlacedGauge { name: gauge.name.clone(), link: number, site, strain });
     }
     Ok(gauges)
@@ -350,8 +348,8 @@ fn fields_and_map(
     Ok(Some((fields, map.map_err(|error| unusable(path, error))?)))
 }
 
-fn unusable(path: &Path, what: impl ToString) -> Error {
-    Error::File { path: path.to_owned(), what: what.to_string() }
+fn unusable(path: &Path, what: impl std::fmt::Display) -> Error {
+    Error::Modelling(format!("{}: {what}", path.display()))
 }
 
 /// Returns the parts without the bodies attached to the link, whose loads act at its interfaces.
