@@ -273,6 +273,8 @@ impl StaticSlopes {
 
     /// Writes the derivatives into `G`, one row and column per coordinate from the first one on;
     /// leaves the poses at `q` in `data`.
+    ///
+    /// * `tool`: a frame T with the wrench `F_To_W` on it, in world axes.
     pub(crate) fn compute(
         &mut self,
         plant: &Plant,
@@ -306,9 +308,10 @@ impl StaticSlopes {
         self.exact.compute(&plant.model, data, q, &self.loads, G);
     }
 
-    /// [`StaticTangent::add_moved_subtree`], after [`StaticSlopes::compute`].
-    pub(crate) fn add_moved_subtree(&self, plant: &Plant, data: &Data, body: usize, moved: &Twist, p: &mut [f64]) {
-        self.exact.add_moved_subtree(&plant.model, data, body, moved, p);
+    /// [`StaticTangent::add_moved_subtree`], after [`StaticSlopes::compute`]; the twist `V_W` is
+    /// about the world origin, in world axes.
+    pub(crate) fn add_moved_subtree(&self, plant: &Plant, data: &Data, body: usize, V_W: &Twist, p: &mut [f64]) {
+        self.exact.add_moved_subtree(&plant.model, data, body, V_W, p);
     }
 
     fn difference(
