@@ -191,8 +191,8 @@ pub mod report {
 /// Recordings of runs: formats, columns, conversion.
 pub mod recordings {
     pub use flexarm_log::{
-        Column, Columns, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, Holds, RecordingFormat, Sample,
-        Trace, flat_columns,
+        Column, Columns, ContentLevel, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, RecordingFormat,
+        Sample, Trace, flat_columns,
     };
     pub use flexarm_run::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 }

@@ -112,11 +112,11 @@ impl<'m> Legs<'m> {
     }
 
     /// Names of joints that are held although they could move the tool.
-    pub(crate) fn held(&self) -> Vec<String> {
-        let mut held: Vec<usize> = self.followers.iter().flat_map(|(_, follower)| follower.held()).collect();
-        held.sort_unstable();
-        held.dedup();
-        held.into_iter().map(|k| self.arm.model.coordinates()[k].joint.clone()).collect()
+    pub(crate) fn fixed_joints(&self) -> Vec<String> {
+        let mut fixed: Vec<usize> = self.followers.iter().flat_map(|(_, follower)| follower.fixed_joints()).collect();
+        fixed.sort_unstable();
+        fixed.dedup();
+        fixed.into_iter().map(|k| self.arm.model.coordinates()[k].joint.clone()).collect()
     }
 
     /// Pose of a frame at joint values, in the model's world.
@@ -271,7 +271,7 @@ impl<'m> Legs<'m> {
         q1: &DVector<f64>,
     ) -> Option<(Vec<GuidedJoint>, DVector<f64>)> {
         let rule = self.options.rule.clone()?;
-        let left_over = self.follower(&way.frame, q0).held();
+        let left_over = self.follower(&way.frame, q0).fixed_joints();
         let length = way.curve.length();
         if left_over.is_empty() {
             return None;

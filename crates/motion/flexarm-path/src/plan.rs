@@ -79,8 +79,8 @@ fn plan_holding(
     }
     let last = items.last().filter(|_| !knots.is_empty()).ok_or_else(|| no_move(&program.name))?;
     check_end(now).map_err(|error| at_item(last, error))?;
-    let held = legs.held();
-    Ok(Planned { trajectory: trajectory(arm.model, knots)?, moves, stops, held })
+    let fixed = legs.fixed_joints();
+    Ok(Planned { trajectory: trajectory(arm.model, knots)?, moves, stops, fixed })
 }
 
 /// Builds curves from the knots of all routes and dwells.

@@ -63,5 +63,5 @@ pub struct Planned {
     /// Corners at which the tool stops although a blend was requested: place and reason.
     pub stops: Vec<(Place, String)>,
     /// Joints held although they could move the tool (redundant arms).
-    pub held: Vec<String>,
+    pub fixed: Vec<String>,
 }

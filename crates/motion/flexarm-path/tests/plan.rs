@@ -496,7 +496,7 @@ fn a_redundant_arm_follows_its_line_with_one_joint_at_rest() {
     let X1 = shifted(&X0, [0.05, -0.1, 0.05]);
     let items = vec![joints(&REDUNDANT), to(MoveKind::Line, pose(X1), feed(0.1), Blend::Stop)];
     let planned = plan(&program(items), &seven_joint_arm(&model), &PathOptions::default()).unwrap();
-    assert_eq!(planned.held.len(), 1);
+    assert_eq!(planned.fixed.len(), 1);
     let way = [X0.translation.vector, X1.translation.vector];
     let off = joints_over_time(&planned, 1500)
         .iter()

@@ -224,7 +224,7 @@ impl Curve {
         let last = self.knots.len() - 1;
         // A remainder from rounding of the times is not a hold.
         if until - self.knots[last] > 1e-14 * until {
-            self.pieces.push(Piece::hold(until - self.knots[last], q));
+            self.pieces.push(Piece::constant(until - self.knots[last], q));
             self.knots.push(until);
         } else {
             self.knots[last] = until;

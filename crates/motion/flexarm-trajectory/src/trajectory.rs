@@ -152,12 +152,12 @@ impl Trajectory {
             qdot.len(),
             qddot.len()
         );
-        let held = t < 0.0 || t > self.duration;
+        let outside = t < 0.0 || t > self.duration;
         for (i, curve) in self.curves.iter().enumerate() {
             let [position, velocity, acceleration, _] = curve.at(t);
             q[i] = position;
-            qdot[i] = if held { 0.0 } else { velocity };
-            qddot[i] = if held { 0.0 } else { acceleration };
+            qdot[i] = if outside { 0.0 } else { velocity };
+            qddot[i] = if outside { 0.0 } else { acceleration };
         }
     }
 
@@ -218,7 +218,7 @@ impl Trajectory {
         for (joint, value) in held {
             assert!(!joints.iter().any(|j| j == joint), "joint {joint:?} moves already");
             joints.push((*joint).to_owned());
-            let pieces = vec![Piece::hold(self.duration, *value)];
+            let pieces = vec![Piece::constant(self.duration, *value)];
             curves.push(Curve { knots: vec![0.0, self.duration], pieces });
         }
         Self::from_curves(joints, curves, self.duration, self.notes.clone())

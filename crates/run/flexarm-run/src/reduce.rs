@@ -16,8 +16,8 @@
 use flexarm_fem::RigidPart;
 use flexarm_flexlink::{SubstitutionError, distal_joint};
 use flexarm_kinematics::{Joint, Pose};
-use flexarm_settings::Setting;
 use flexarm_settings::Finding;
+use flexarm_settings::Setting;
 use flexarm_urdf::{ReadOptions, UrdfError, read_urdf};
 
 use crate::error::Error;

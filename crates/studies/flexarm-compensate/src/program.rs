@@ -20,8 +20,8 @@ use nalgebra::{DVector, Translation3, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::{CompensateError, CompensateRequest};
 use super::job::averaged;
+use super::{CompensateError, CompensateRequest};
 use flexarm_run::tool_path::{Cell, Overrides, program_text};
 use flexarm_run::{AppliedLoad, Arm, Error, Motion, Robot, Scenario};
 
@@ -284,7 +284,7 @@ type TargetValues = (NewTarget, Option<Vector3<f64>>);
 struct AtRest<'a> {
     arm: &'a ProgramArm<'a>,
     /// Flexible arm with motors held; each load is replaced by its mean over the rest at that time.
-    held: Plant,
+    fixed: Plant,
     /// Payload changes, in order of time.
     changes: Vec<InertiaChange>,
     tcp: Frame,
@@ -303,9 +303,9 @@ impl<'a> AtRest<'a> {
         request: &CompensateRequest,
         rests: Vec<[f64; 2]>,
     ) -> Result<Self, Error> {
-        let held = Held(vec![0.0; controller.model.n_actuated()]);
-        let held = arm.plant(Arc::new(held)).map_err(|error| arm.explained(error))?;
-        let sags = held.servo.iter().flat_map(|servo| &servo.axes).any(|axis| axis.integral_gain <= 0.0);
+        let fixed = Held(vec![0.0; controller.model.n_actuated()]);
+        let fixed = arm.plant(Arc::new(fixed)).map_err(|error| arm.explained(error))?;
+        let sags = fixed.servo.iter().flat_map(|servo| &servo.axes).any(|axis| axis.integral_gain <= 0.0);
         let rests: Arc<[[f64; 2]]> = rests.into();
         let mean = |load: &AppliedLoad| {
             let rests = rests.clone();
@@ -314,11 +314,11 @@ impl<'a> AtRest<'a> {
             })
         };
         let loads = scenario.loads.iter().map(mean).collect();
-        let acting = Scenario { loads, ..scenario.clone() }.acting_on(arm.robot(), &held.model)?;
-        let held = held.with_motors_held();
-        let held = held.with_timed_loads(acting.loads).map_err(|error| arm.explained(error))?;
+        let acting = Scenario { loads, ..scenario.clone() }.acting_on(arm.robot(), &fixed.model)?;
+        let fixed = fixed.with_motors_held();
+        let fixed = fixed.with_timed_loads(acting.loads).map_err(|error| arm.explained(error))?;
         let (tcp, loads) = (arm.tcp.clone(), scenario.loads.clone());
-        Ok(Self { arm: controller, held, changes: acting.changes, tcp, components: request.components, loads, sags })
+        Ok(Self { arm: controller, fixed, changes: acting.changes, tcp, components: request.components, loads, sags })
     }
 
     fn is_loaded(&self) -> bool {
@@ -354,7 +354,7 @@ impl<'a> AtRest<'a> {
     /// Returns the arm with its payload at a time.
     fn carrying(&self, t: f64) -> Plant {
         let due = self.changes.iter().take_while(|change| change.t <= t);
-        due.fold(self.held.clone(), |plant, change| plant.with_inertia(change.body, change.inertia))
+        due.fold(self.fixed.clone(), |plant, change| plant.with_inertia(change.body, change.inertia))
     }
 
     /// Returns the tool frame of a move on the flexible arm.
@@ -406,8 +406,8 @@ impl<'a> AtRest<'a> {
     fn off(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<Vector6<f64>, StepError> {
         let m = self.arm.model.n_actuated();
         let t = stop.rest_s[0];
-        let held = self.carrying(t).along(Arc::new(Held(q.as_slice()[..m].to_vec())));
-        let at = linearise(&held, &self.tool(stop.of), &Wrench::zeros(), t)?;
+        let fixed = self.carrying(t).along(Arc::new(Held(q.as_slice()[..m].to_vec())));
+        let at = linearise(&fixed, &self.tool(stop.of), &Wrench::zeros(), t)?;
         let wanted = self.rigid(stop.of, stop.q);
         let p = at.X_WT.translation.vector - wanted.translation.vector;
         let r = rotation_vector((at.X_WT.rotation * wanted.rotation.inverse()).matrix());

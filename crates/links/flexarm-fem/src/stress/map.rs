@@ -165,9 +165,9 @@ impl StressFields {
                 let of_mesh = fields.column(wrenches + j);
                 residual.iter_mut().zip(of_mesh.iter()).for_each(|(residual, field)| *residual = f64::from(*field));
                 for (k, own) in own.iter().enumerate() {
-                    let held = mapped.column(k);
-                    let pairs = residual.iter_mut().zip(held.iter());
-                    pairs.for_each(|(residual, held)| *residual -= own * f64::from(*held));
+                    let kept = mapped.column(k);
+                    let pairs = residual.iter_mut().zip(kept.iter());
+                    pairs.for_each(|(residual, kept)| *residual -= own * f64::from(*kept));
                 }
                 let pairs = mapped.column_mut(n + j).into_iter().zip(&residual);
                 pairs.for_each(|(mapped, residual)| *mapped = *residual as f32);

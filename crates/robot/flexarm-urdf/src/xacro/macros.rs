@@ -272,8 +272,8 @@ pub fn parameters(text: &str) -> Vec<Parameter> {
         rest = after.trim_start();
     }
     // A duplicate parameter counts once.
-    let mut seen = HashSet::new();
-    found.retain(|p| seen.insert(p.name.clone()));
+    let mut names = HashSet::new();
+    found.retain(|p| names.insert(p.name.clone()));
     found
 }
 

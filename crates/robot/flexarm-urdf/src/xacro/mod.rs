@@ -56,7 +56,7 @@ pub(crate) struct Expanded {
     pub(crate) text: String,
     /// Origin of each line of the text.
     pub(crate) origins: Vec<Place>,
-    /// Messages of `xacro.warning` etc., and doubts about the arguments.
+    /// Messages of `xacro.warning` etc., and warnings about the arguments.
     pub(crate) remarks: Vec<Finding>,
     /// Macros that are defined but not called, if the document has nothing else.
     pub(crate) idle_macros: Vec<String>,
@@ -156,7 +156,7 @@ impl<'a> Interpreter<'a> {
         let root = document::parse(text, &file)?;
         let scope = scope::Table::root();
         let root = self.element(&root, &macros::Macros::new(), &scope)?;
-        self.doubt_arguments(&given, path);
+        self.check_arguments(&given, path);
         let has_links = root.elements().any(|e| e.name == "link");
         let idle = self.defined_macros.difference(&self.called_macros).cloned();
         let idle_macros = if has_links { Vec::new() } else { idle.collect() };
@@ -166,7 +166,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// Warns about unused arguments, which are probably misspelt.
-    fn doubt_arguments(&mut self, given: &[String], path: &Path) {
+    fn check_arguments(&mut self, given: &[String], path: &Path) {
         for name in given {
             if self.used_arguments.contains(name) || self.declared_arguments.contains(name) {
                 continue;

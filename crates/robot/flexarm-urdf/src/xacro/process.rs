@@ -89,8 +89,8 @@ impl Interpreter<'_> {
             "if" | "unless" => {
                 let condition = self.required(element, "value")?.to_owned();
                 let value = self.text(&condition, scope).map_err(|e| self.fault(at, e))?;
-                let holds = boolean(&value).ok_or_else(|| self.fault(at, not_boolean(&condition, &value)))?;
-                if holds == (name == "if") {
+                let is_true = boolean(&value).ok_or_else(|| self.fault(at, not_boolean(&condition, &value)))?;
+                if is_true == (name == "if") {
                     content.nodes.extend(self.children(&element.children, macros, scope)?.nodes);
                 }
             }

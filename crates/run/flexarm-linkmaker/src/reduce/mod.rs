@@ -128,7 +128,7 @@ impl Reduction {
         progress: &mut dyn FnMut(ReduceProgress),
     ) -> Result<ReduceSummary, LinkError> {
         let Self { job, paths, mesh, stopwatch } = self;
-        let Prepared { plan, file, units, chosen, materials, doubts } = prepare(&job, mesh, robot)?;
+        let Prepared { plan, file, units, chosen, materials, findings } = prepare(&job, mesh, robot)?;
         let read_s = stopwatch.wall_s();
 
         let mut starts = Vec::new();
@@ -141,7 +141,7 @@ impl Reduction {
         starts.push(stopwatch.wall_s());
 
         let mut summary = summary_of(&job, &plan, &file, units, &chosen, materials, &reduction);
-        let before = about(&summary.link, doubts);
+        let before = about(&summary.link, findings);
         summary.caveats.splice(0..0, before);
         summary.warnings = warnings(&summary.caveats);
         summary.phases = phases(read_s, &starts);

@@ -29,7 +29,7 @@ pub(super) struct Prepared {
     pub(super) units: UnitSystem,
     pub(super) chosen: Vec<SelectedInterface>,
     pub(super) materials: Vec<RegionFigures>,
-    pub(super) doubts: Vec<Finding>,
+    pub(super) findings: Vec<Finding>,
 }
 
 /// Reads the mesh of a job in its own axes, SI, with its nodes merged as the job requests; also
@@ -93,22 +93,22 @@ pub(super) fn prepare(
     if !faults.is_empty() {
         return Err(LinkError::of_all(faults));
     }
-    let doubt = |code: &'static str| move |sentence: String| Finding::warning(code, "", sentence, "");
-    let mut doubts: Vec<Finding> = warnings.into_iter().map(doubt("mesh-file")).collect();
-    doubts.extend(chosen.iter().flat_map(SelectedInterface::seat_doubts).map(doubt("interface-nodes")));
-    doubts.extend(place.doubts(&chosen).into_iter().map(doubt("interface-frame")));
-    doubts.extend(material_doubts(&file, units, &materials).into_iter().map(doubt("material")));
+    let finding = |code: &'static str| move |sentence: String| Finding::warning(code, "", sentence, "");
+    let mut findings: Vec<Finding> = warnings.into_iter().map(finding("mesh-file")).collect();
+    findings.extend(chosen.iter().flat_map(SelectedInterface::node_warnings).map(finding("interface-nodes")));
+    findings.extend(place.findings(&chosen).into_iter().map(finding("interface-frame")));
+    findings.extend(material_doubts(&file, units, &materials).into_iter().map(finding("material")));
     let mut plan = plan(job, &file, units, &chosen, &materials);
     plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
     if let (Some(robot), Some(entry)) = (robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
         let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
-        let mesh =
-            mass_properties(&file.mesh, &densities).map_err(|error| LinkError::content(&job.mesh, error.to_string()))?;
+        let mesh = mass_properties(&file.mesh, &densities)
+            .map_err(|error| LinkError::content(&job.mesh, error.to_string()))?;
         let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
         plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::content(&entry.file, what))?.into();
     }
-    Ok(Prepared { plan, file, units, chosen, materials, doubts })
+    Ok(Prepared { plan, file, units, chosen, materials, findings })
 }
 
 /// Merges coincident nodes.
@@ -128,20 +128,20 @@ fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut V
 
 /// Returns warnings about the materials in use, with the numbers as given.
 fn material_doubts(file: &MeshFile, units: UnitSystem, figures: &[RegionFigures]) -> Vec<String> {
-    let mut doubts: Vec<(String, Vec<&str>)> = Vec::new();
+    let mut findings: Vec<(String, Vec<&str>)> = Vec::new();
     for figure in figures {
         let region = file.mesh.regions.iter().find(|region| region.name == figure.region);
         let Some(material) = region.and_then(|region| region.material) else { continue };
         // Materials of a job are in SI, independent of the units of the mesh.
         let written = if figure.from == "mesh" { units } else { UnitSystem::SI };
-        for doubt in material.doubts(&written) {
-            match doubts.iter_mut().find(|(known, _)| *known == doubt) {
+        for finding in material.warnings(&written) {
+            match findings.iter_mut().find(|(known, _)| *known == finding) {
                 Some((_, regions)) => regions.push(&figure.region),
-                None => doubts.push((doubt, vec![&figure.region])),
+                None => findings.push((finding, vec![&figure.region])),
             }
         }
     }
-    doubts.into_iter().map(|(doubt, regions)| format!("material of {}: {doubt}", regions.join(", "))).collect()
+    findings.into_iter().map(|(finding, regions)| format!("material of {}: {finding}", regions.join(", "))).collect()
 }
 
 fn no_units(job: &ReduceJob, file: &MeshFile) -> LinkError {

@@ -183,7 +183,7 @@ fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Sourc
     let written = LoadLocation::new(source, entry.span(), e.frame.as_ref().map(Spanned::span), None);
     let load =
         AppliedLoad::new(name, TimedWrench { axes, value, jumps, stops: Vec::new(), period }).starting_at(e.start);
-    Ok(AppliedLoad { written: Some(written), doubts: doubts(e), ..load })
+    Ok(AppliedLoad { written: Some(written), findings: findings(e), ..load })
 }
 
 fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFileError> {
@@ -200,7 +200,7 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
 
 /// Caveats about angles that look like degrees (the phase of a sine, arguments of sin and cos in
 /// expressions), impulses and spindle speeds.
-fn doubts(e: &LoadEntry) -> Vec<Finding> {
+fn findings(e: &LoadEntry) -> Vec<Finding> {
     let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
     let number = |value: &Option<Spanned<f64>>| value.as_ref().map(|value| *value.get_ref());
     let [pulse, spindle] = [&e.duration, &e.spindle_rpm].map(number);

@@ -255,12 +255,12 @@ pub struct AlongMotion {
 /// [`Error::Loop`] with the time at which a loop does not close or passes a dead point.
 pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotion, Error> {
     let (n, loops) = (model.nv(), model.loops().len());
-    let mut seen = AlongMotion {
+    let mut found = AlongMotion {
         smallest: vec![(f64::INFINITY, 0.0); loops],
         range: vec![[f64::INFINITY, f64::NEG_INFINITY]; model.dependent().len()],
     };
     if loops == 0 {
-        return Ok(seen);
+        return Ok(found);
     }
     let (mut data, mut q, mut v, mut a) = (Data::new(model), DVector::zeros(n), vec![0.0; n], vec![0.0; n]);
     // Angles at the last two times.
@@ -283,13 +283,13 @@ pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotio
                 return Err(at(k, DEAD_POINT));
             }
             before[k] = [last, angle];
-            if angle < seen.smallest[k].0 {
-                seen.smallest[k] = (angle, t);
+            if angle < found.smallest[k].0 {
+                found.smallest[k] = (angle, t);
             }
         }
-        for ([low, high], value) in seen.range.iter_mut().zip(data.dependent_values()) {
+        for ([low, high], value) in found.range.iter_mut().zip(data.dependent_values()) {
             (*low, *high) = (low.min(*value), high.max(*value));
         }
     }
-    Ok(seen)
+    Ok(found)
 }

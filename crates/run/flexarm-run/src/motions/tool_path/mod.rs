@@ -201,13 +201,13 @@ impl ToolPath {
         let mut warnings: Vec<Finding> = warnings.iter().map(|text| warning(&file, text)).collect();
         let stops = planned.stops.iter().map(|(place, why)| warning(place, format!("no blend: {why}"))).collect();
         warnings.extend(first_of(stops, &file));
-        let held = planned.held.join(", ");
-        if !held.is_empty() {
+        let fixed = planned.fixed.join(", ");
+        if !fixed.is_empty() {
             let what = match options.rule {
                 None => "stay while the tool follows its path (redundancy of a path file chooses otherwise)",
                 Some(_) => "move redundantly, towards the requested posture",
             };
-            let text = format!("the arm has more joints than the path needs: {held} {what}");
+            let text = format!("the arm has more joints than the path needs: {fixed} {what}");
             warnings.push(warning(&file, text));
         }
         warnings.extend(tool_warning(program, arm));
