@@ -4,7 +4,7 @@
 //! number may have a decimal comma. Empty lines and lines that begin with # are skipped. Not here:
 //! the meaning of the columns.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flexarm_settings::written::{csv_column, csv_fields};
 
@@ -19,6 +19,8 @@ pub struct NumberTable {
     pub rows: Vec<Vec<f64>>,
     /// Line of each row in the file, from 1.
     pub lines: Vec<usize>,
+    path: PathBuf,
+    header_line: usize,
 }
 
 impl NumberTable {
@@ -66,7 +68,7 @@ impl NumberTable {
             };
             return Err(fault(header_line, column(header, k), message).into());
         }
-        let mut table = Self { names, rows: Vec::new(), lines: Vec::new() };
+        let mut table = Self { names, rows: Vec::new(), lines: Vec::new(), path: path.to_owned(), header_line };
         for (line, text) in lines.filter(|(_, line)| counts(line)) {
             let cells = cells(text);
             let (found, expected) = (cells.len(), table.names.len());
@@ -85,6 +87,12 @@ impl NumberTable {
             table.lines.push(line);
         }
         Ok(table)
+    }
+
+    /// Creates an error about a row, counted from 0; `None` for the header.
+    pub fn error(&self, row: Option<usize>, message: impl Into<String>) -> FileError {
+        let line = row.map_or(self.header_line, |row| self.lines[row]);
+        TextFileError { path: self.path.clone(), line, column: 1, message: message.into(), page: "" }.into()
     }
 
     /// Index of a column.

@@ -4,6 +4,8 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
+use flexarm_settings::Place;
+
 use crate::FileError;
 
 /// Maximum size of a file (bytes).
@@ -51,7 +53,7 @@ pub fn read_text(path: &Path) -> Result<String, FileError> {
 
 /// Error in a text file, with its position.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{}:{line}:{column}: {message}", path.display())]
+#[error("{}: {message}", self.place())]
 pub struct TextFileError {
     /// The file.
     pub path: PathBuf,
@@ -63,6 +65,13 @@ pub struct TextFileError {
     pub message: String,
     /// Documentation page that describes the format: `robot`, `loads`, `measurements`, ...
     pub page: &'static str,
+}
+
+impl TextFileError {
+    /// Returns its place in the file.
+    pub fn place(&self) -> Place {
+        Place::of_file(self.path.display()).at(self.line, self.column)
+    }
 }
 
 /// Text of a file with its path, for error positions.

@@ -40,6 +40,8 @@ pub enum YamlValue<'t> {
 pub struct YamlError {
     /// Line, from 1.
     pub line: usize,
+    /// Column, from 1.
+    pub column: usize,
     /// Cause, worded as the end of a sentence.
     pub message: String,
 }
@@ -81,10 +83,10 @@ pub fn read_yaml<'t, E: From<YamlError>>(
     for event in Parser::new_from_str(text) {
         let (event, span) = event.map_err(|error| {
             let (line, column) = (error.marker().line(), error.marker().col() + 1);
-            YamlError { line, message: format!("{}, column {column}", error.info()) }
+            YamlError { line, column, message: error.info().to_owned() }
         })?;
-        let line = span.start.line();
-        let fail = |message: String| E::from(YamlError { line, message });
+        let (line, column) = (span.start.line(), span.start.col() + 1);
+        let fail = |message: String| E::from(YamlError { line, column, message });
         let new = |value, anchor| SizedNode { node: YamlNode { line, value }, anchor, size: 1, height: 0 };
         let mut done = None;
         match event {

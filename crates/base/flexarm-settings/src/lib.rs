@@ -1,6 +1,6 @@
 //! Building blocks of errors and caveats: settings named in messages, which each front end names in
-//! its own way ([`Setting`]); what is found in an input or a result ([`Finding`]); the party
-//! responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); choices by a
+//! its own way ([`Setting`]); what is found in an input or a result ([`Finding`]) and where in a file
+//! ([`Place`]); the party responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); choices by a
 //! word ([`Words`]); TOML messages without type names ([`without_types`]); escaping of foreign text
 //! for each kind of output ([`written`]).
 //!
@@ -22,6 +22,7 @@
 mod fault;
 pub mod finding;
 mod gathered;
+mod place;
 mod quantity;
 mod spelling;
 mod toml_message;
@@ -34,6 +35,7 @@ use std::sync::OnceLock;
 pub use fault::Fault;
 pub use finding::{Finding, Severity};
 pub use gathered::gathered;
+pub use place::Place;
 pub use quantity::{OutOfRange, Quantity};
 pub use spelling::{closest, known_names};
 pub use toml_message::without_types;

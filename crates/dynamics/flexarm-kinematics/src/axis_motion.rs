@@ -130,7 +130,7 @@ impl AxisMotion {
         )
     }
 
-    /// `S` as a 6-vector, linear part first.
+    /// `S` as a 6-vector in the axes J of the joint, linear part first.
     pub fn column(self) -> Vector6<f64> {
         self.linear(
             |axis| Vector6::new(0.0, 0.0, 0.0, axis.x, axis.y, axis.z),
@@ -138,13 +138,11 @@ impl AxisMotion {
         )
     }
 
-    /// Coordinate of a small displacement `S q` (linear part first): left inverse of
-    /// [`Self::column`].
-    pub fn coordinate_of(self, displacement: &Vector6<f64>) -> f64 {
-        let along = self.linear(
-            |axis| axis.dot(&displacement.fixed_rows::<3>(3)),
-            |axis| axis.dot(&displacement.fixed_rows::<3>(0)),
-        );
+    /// Coordinate of a small displacement `S q`: left inverse of [`Self::column`].
+    ///
+    /// * `d_J`: displacement (m) and rotation (rad) at the joint, in its axes J.
+    pub fn coordinate_of(self, d_J: &Vector6<f64>) -> f64 {
+        let along = self.linear(|axis| axis.dot(&d_J.fixed_rows::<3>(3)), |axis| axis.dot(&d_J.fixed_rows::<3>(0)));
         match self {
             Self::Revolute(_) | Self::Prismatic(_) => along,
             Self::Helical { pitch, .. } => along / (1.0 + pitch * pitch),
@@ -167,9 +165,10 @@ pub(crate) struct RevoluteTable {
 }
 
 impl RevoluteTable {
-    pub(crate) fn new(X_PJ: &Pose, axis: &Vector3<f64>) -> Self {
-        let (R, A) = (X_PJ.rotation.matrix(), skew(axis));
-        let A2 = axis * axis.transpose() - Matrix3::identity();
+    /// Creates the table of a joint with the unit axis `axis_J`.
+    pub(crate) fn new(X_PJ: &Pose, axis_J: &Vector3<f64>) -> Self {
+        let (R, A) = (X_PJ.rotation.matrix(), skew(axis_J));
+        let A2 = axis_J * axis_J.transpose() - Matrix3::identity();
         Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
     }
 

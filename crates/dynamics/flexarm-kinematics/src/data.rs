@@ -312,7 +312,7 @@ pub(crate) fn subspace_times<T: Real>(model: &Model, data: &Data<T>, i: usize, q
     }
 }
 
-/// `tau += Sᵀ F`.
+/// `tau += Sᵀ F`, with the wrench F on body B at Bo, in B axes.
 #[inline(always)]
 pub(crate) fn add_projection<T: Real>(
     model: &Model,

@@ -98,7 +98,7 @@ pub fn inverse_kinematics(
         frame_jacobian(model, data, frame, &mut J);
         let mut Jw = DMatrix::from_fn(6, n, |r, c| if r < 3 { J[(r, c)] } else { J[(r, c)] * length });
         let e = weigh(&error);
-        hold_at_limits(&mut Jw, &e, &q, &limits);
+        fix_at_limits(&mut Jw, &e, &q, &limits);
         // Increase the damping until a step reduces the error.
         let scale = Jw.norm_squared().max(1e-12);
         let mut improved = false;
@@ -127,11 +127,11 @@ pub fn inverse_kinematics(
 }
 
 /// Zeroes the columns of joints at a limit that the gradient of the error pushes outward.
-fn hold_at_limits(Jw: &mut DMatrix<f64>, e: &Vector6<f64>, q: &DVector<f64>, limits: &[(f64, f64)]) {
+fn fix_at_limits(Jw: &mut DMatrix<f64>, e: &Vector6<f64>, q: &DVector<f64>, limits: &[(f64, f64)]) {
     let gradient = Jw.tr_mul(e);
     for (k, (lower, upper)) in limits.iter().enumerate() {
-        let held = (q[k] <= *lower && gradient[k] < 0.0) || (q[k] >= *upper && gradient[k] > 0.0);
-        if held {
+        let is_fixed = (q[k] <= *lower && gradient[k] < 0.0) || (q[k] >= *upper && gradient[k] > 0.0);
+        if is_fixed {
             Jw.column_mut(k).fill(0.0);
         }
     }

@@ -307,7 +307,8 @@ impl<T: Real> ModalData<T> {
         self.inertia = SpatialInertia { mass: T::splat(shapes.mass), first_moment: h, rotational: J };
     }
 
-    /// Velocity terms of (5), without spatial acceleration and `η̈`: returns `[F; T]`, sets `f`.
+    /// Velocity terms of (5), without spatial acceleration and `η̈`: returns `[F; T]`, sets `f`. Twist
+    /// and wrench at the origin of the body frame, in its axes.
     #[inline(always)]
     pub(crate) fn bias(&mut self, tables: &ModalTables, V: &Twist<T>, rates: &[T]) -> Wrench<T> {
         let (w, v) = (V.angular, V.linear);
@@ -352,7 +353,7 @@ impl<T: Real> ModalData<T> {
     }
 
     /// Mass terms of (5) for spatial acceleration A and `η̈` (`None` for zero): adds to `f` and
-    /// returns the wrench.
+    /// returns the wrench, both at the origin of the body frame, in its axes.
     #[inline(always)]
     pub(crate) fn inertia_forces(
         &mut self,
@@ -389,7 +390,8 @@ impl ModalData {
         energy
     }
 
-    /// Momentum about the body origin (kg m/s, kg m²/s), for the same rates.
+    /// Momentum about the origin of the body frame, in its axes (kg m/s, kg m²/s), for the same
+    /// rates.
     pub(crate) fn momentum(&self, tables: &ModalTables, V: &Twist) -> Wrench {
         let mut p = self.inertia.mul_twist(V);
         for (k, rate) in self.rates.iter().enumerate() {
@@ -413,7 +415,7 @@ impl InterfaceShape {
         (Vector3::new(y[0], y[1], y[2]), Vector3::new(y[3], y[4], y[5]))
     }
 
-    /// `f += Φᵀ [force; moment]`.
+    /// `f += Φᵀ [force; moment]`, at the origin of the interface, in axes of the body.
     #[inline(always)]
     pub(crate) fn add_transposed<T: Real>(&self, force: &Vector3<T>, moment: &Vector3<T>, f: &mut [T]) {
         for (column, f) in self.Phi.as_slice().chunks_exact(6).zip(f) {

@@ -41,13 +41,13 @@ pub enum StepError {
     },
     /// The iteration of a step did not converge while links deflected beyond their model.
     #[error(
-        "the step to t = {t:.6} s did not converge, and a smaller step does not help: the model has ended there, because {doubt}"
+        "the step to t = {t:.6} s did not converge, and a smaller step does not help: the model has ended there, because {finding}"
     )]
     BeyondModel {
         /// Time (s).
         t: f64,
         /// Finding about the link.
-        doubt: String,
+        finding: String,
     },
     /// A matrix that must be positive definite is not.
     #[error("the {matrix} at t = {t:.6} s is not positive definite: check masses and stiffnesses")]

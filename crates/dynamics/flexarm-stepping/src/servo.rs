@@ -80,7 +80,7 @@ impl ServoState {
 
     /// Initialises the controller such that the first sample returns the torques `needed` if the
     /// joints are on their reference.
-    pub(crate) fn hold(&mut self, needed: &DVector<f64>) {
+    pub(crate) fn start_at(&mut self, needed: &DVector<f64>) {
         for (torque, axis) in self.torque.iter_mut().zip(&self.servo.axes) {
             *torque = needed[axis.coordinate];
         }

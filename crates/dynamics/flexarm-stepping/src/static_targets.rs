@@ -87,8 +87,8 @@ pub fn static_targets(
     let mut before = None;
     for iterations in 0..=MAX_ITERATIONS {
         // Pose of the tool at rest with the motors at the targets.
-        let held = plant.along(Arc::new(Held(targets.as_slice().to_vec())));
-        let at = linearise(&held, tool, F_T_W, t)?;
+        let fixed = plant.along(Arc::new(Held(targets.as_slice().to_vec())));
+        let at = linearise(&fixed, tool, F_T_W, t)?;
         let off = displacement(&wanted, &at.X_WT);
         let before = *before.get_or_insert(off);
         let left = DVector::from_iterator(rows.len(), rows.iter().map(|k| off[*k]));

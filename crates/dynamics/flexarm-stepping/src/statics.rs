@@ -273,6 +273,8 @@ impl StaticSlopes {
 
     /// Writes the derivatives into `G`, one row and column per coordinate from the first one on;
     /// leaves the poses at `q` in `data`.
+    ///
+    /// * `tool`: a frame T with the wrench `F_To_W` on it, in world axes.
     pub(crate) fn compute(
         &mut self,
         plant: &Plant,
@@ -306,7 +308,8 @@ impl StaticSlopes {
         self.exact.compute(&plant.model, data, q, &self.loads, G);
     }
 
-    /// [`StaticTangent::add_moved_subtree`], after [`StaticSlopes::compute`].
+    /// [`StaticTangent::add_moved_subtree`], after [`StaticSlopes::compute`]; the twist of the moved
+    /// body is about the world origin, in world axes.
     pub(crate) fn add_moved_subtree(
         &mut self,
         plant: &Plant,

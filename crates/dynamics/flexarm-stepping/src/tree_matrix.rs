@@ -245,7 +245,7 @@ struct Eliminated<const F: usize> {
     /// `Δ^-1`.
     inverse: Matrices<F>,
     /// `Δ^-1 Î`.
-    held: Matrices<F>,
+    solved: Matrices<F>,
     /// `Î`.
     inertia: Matrices<F>,
     /// During a solution the forces from the children, then `α`.
@@ -265,7 +265,8 @@ impl<const F: usize> Elimination<F> {
     fn factor(&mut self, tree: &[TreeNode], s: f64) -> bool {
         self.s = s;
         let (zero, none) = ([[Matrix6::zeros(); F]; F], [Vector6::zeros(); F]);
-        self.nodes.resize(tree.len(), Eliminated { inverse: zero, held: zero, inertia: zero, carried: none, w: none });
+        self.nodes
+            .resize(tree.len(), Eliminated { inverse: zero, solved: zero, inertia: zero, carried: none, w: none });
         for (node, own) in self.nodes.iter_mut().zip(tree) {
             node.inertia = zero;
             (0..F).for_each(|i| node.inertia[i][i] = own.inertia);
@@ -284,10 +285,10 @@ impl<const F: usize> Elimination<F> {
             // Columns of Δ^-1 Î and of S Δ^-1 Î, F vectors each.
             let mut passed = zero;
             for (c, k) in (0..F).flat_map(|c| (0..6).map(move |k| (c, k))) {
-                let held = products(&node.inverse, &from_fn(|i| node.inertia[i][c].column(k).into()));
-                let stretched = own.stretched(s, &held);
+                let solved = products(&node.inverse, &from_fn(|i| node.inertia[i][c].column(k).into()));
+                let stretched = own.stretched(s, &solved);
                 for i in 0..F {
-                    node.held[i][c].set_column(k, &held[i]);
+                    node.solved[i][c].set_column(k, &solved[i]);
                     passed[i][c].set_column(k, &stretched[i]);
                 }
             }
@@ -327,9 +328,9 @@ impl<const F: usize> Elimination<F> {
                 continue;
             };
             let moved: Vectors<F> = from_fn(|i| own.outward(&inner[p].carried[i]));
-            let held = products(&node.held, &moved);
+            let solved = products(&node.solved, &moved);
             for i in 0..F {
-                node.w[i] -= held[i];
+                node.w[i] -= solved[i];
                 node.carried[i] = moved[i] + node.w[i];
             }
         }

@@ -4,7 +4,6 @@
 use std::process::ExitCode;
 
 use flexarm::Fault;
-use flexarm::errors::TrajectoryError;
 use flexarm::recordings::RecordingFormat;
 
 use crate::print::{complaint, say};
@@ -131,7 +130,7 @@ pub(crate) fn build_with(format: RecordingFormat) -> String {
 fn page_of(error: &flexarm::Error) -> Option<&'static str> {
     match error {
         flexarm::Error::InStudy { source, .. } => page_of(source),
-        flexarm::Error::Trajectory(TrajectoryError::File(_)) | flexarm::Error::Motion(_) => Some("motion"),
+        flexarm::Error::Motion(_) => Some("motion"),
         flexarm::Error::RobotFile(fault)
             if fault.message.contains("unknown field") || matches!(fault.page, "measurements" | "tool") =>
         {

@@ -5,7 +5,7 @@
 
 use anstyle::{AnsiColor, Style};
 use flexarm::Summary;
-use flexarm::recordings::{Holds, RecordingFormat};
+use flexarm::recordings::{ContentLevel, RecordingFormat};
 use flexarm::report::{Figure, Weight, figure_groups};
 use flexarm::runs::{Files, STUDY_NOTE, study_rows};
 use flexarm::settings::written::one_line;
@@ -83,7 +83,7 @@ fn files(f: &Files) -> String {
     let mut out = String::new();
     // Recordings for viewers come before those for programs.
     let mut recordings: Vec<(RecordingFormat, &str)> = f.recordings.iter().collect();
-    recordings.sort_by_key(|(format, _)| format.info().holds != Holds::Pictures);
+    recordings.sort_by_key(|(format, _)| format.info().content != ContentLevel::Pictures);
     let recordings = recordings.iter().map(|(format, path)| (format.info().name, Some(*path)));
     let pages = [("report", f.report.as_deref()), ("stress", f.stress.as_deref()), ("study", f.study.as_deref())];
     let files = pages.into_iter().chain(recordings).chain([("figures", f.figures.as_deref())]);

@@ -26,6 +26,7 @@ mod messages;
 mod models;
 mod motion;
 mod new;
+mod places;
 mod reduce;
 mod report_again;
 mod robots;

@@ -549,7 +549,7 @@ impl PyArm {
     ) -> PyResult<flexarm::Run> {
         let watch = Mutex::new(Watch::new(progress));
         let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut look = |done: f64, total: f64| locked().look(done, total);
+        let mut report = |done: f64, total: f64| locked().poll(done, total);
         let mut show = observer.map(|observer| {
             let locked = &locked;
             move |sample: &flexarm::recordings::Sample| {
@@ -566,7 +566,7 @@ impl PyArm {
             let show = show
                 .as_mut()
                 .map(|show| show as &mut dyn FnMut(&flexarm::recordings::Sample) -> std::ops::ControlFlow<()>);
-            let request = RunRequest { outputs, observer: show, progress: Some(&mut look), ..RunRequest::default() };
+            let request = RunRequest { outputs, observer: show, progress: Some(&mut report), ..RunRequest::default() };
             self.arm.simulate_with(scenario, options, request)
         });
         drop(show);

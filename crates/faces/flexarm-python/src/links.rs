@@ -59,8 +59,8 @@ pub(crate) fn reduce<'py>(
     let lock =
         |begun: &Mutex<Vec<ReduceProgress>>| std::mem::take(&mut *begun.lock().unwrap_or_else(PoisonError::into_inner));
     let mut tell = |py: Python<'_>| {
-        let told = lock(&begun).into_iter();
-        told.map(|s| (s.step, s.number, s.of)).try_for_each(|step| caveat::say(py, "step", step))
+        let steps_done = lock(&begun).into_iter();
+        steps_done.map(|s| (s.step, s.number, s.of)).try_for_each(|step| caveat::say(py, "step", step))
     };
     let work = move |_: &(dyn Fn() -> bool + Sync)| {
         let mut begin = |step| steps.lock().unwrap_or_else(PoisonError::into_inner).push(step);

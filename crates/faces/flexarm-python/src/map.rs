@@ -360,7 +360,7 @@ fn with_bar<'py>(
 fn watched(py: Python<'_>, robot: &Robot, request: &MapRequest, progress: Option<Py<PyAny>>) -> PyResult<Map> {
     // Progress, reported by the thread that may call Python.
     let at: Arc<Mutex<Option<(f64, f64)>>> = Arc::default();
-    let seen = at.clone();
+    let reported = at.clone();
     let (robot, request) = (robot.clone(), request.clone());
     let work = move |stop: &(dyn Fn() -> bool + Sync)| {
         take(&robot, &request, &mut |done, all| {
@@ -368,7 +368,7 @@ fn watched(py: Python<'_>, robot: &Robot, request: &MapRequest, progress: Option
             if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
     };
-    let mut tell = |py: Python<'_>| match (seen.lock().unwrap_or_else(PoisonError::into_inner).take(), &progress) {
+    let mut tell = |py: Python<'_>| match (reported.lock().unwrap_or_else(PoisonError::into_inner).take(), &progress) {
         (Some((done, all)), Some(progress)) => progress.call1(py, (done, all)).map(drop),
         _ => Ok(()),
     };

@@ -204,7 +204,7 @@ fn positive(what: &str, x: f64) -> PyResult<f64> {
     }
 }
 
-/// Lists errors and doubts about a robot and a motion, with the reference values.
+/// Lists errors and warnings about a robot and a motion, with the reference values.
 ///
 /// Parameters
 /// ----------

@@ -54,15 +54,15 @@ pub(crate) fn sweep<'py>(
     let bar = progress_function(py, progress)?;
     // Progress, reported by the thread that may call Python.
     let at: Arc<Mutex<Option<(usize, usize)>>> = Arc::default();
-    let seen = at.clone();
+    let reported = at.clone();
     let work = move |stop: &(dyn Fn() -> bool + Sync)| {
-        let mut look = |done: usize, all: usize| {
+        let mut report = |done: usize, all: usize| {
             *at.lock().unwrap_or_else(PoisonError::into_inner) = Some((done, all));
             if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        sweep.run(&request, &mut look)
+        sweep.run(&request, &mut report)
     };
-    let mut tell = |_: Python<'_>| match (seen.lock().unwrap_or_else(PoisonError::into_inner).take(), &bar) {
+    let mut tell = |_: Python<'_>| match (reported.lock().unwrap_or_else(PoisonError::into_inner).take(), &bar) {
         (Some((done, all)), Some(bar)) => bar.call1((done as f64, all as f64)).map(drop),
         _ => Ok(()),
     };

@@ -19,8 +19,8 @@ const TELL_EVERY: Duration = Duration::from_millis(50);
 /// Checks signals and reports progress from within a run, on the calling thread.
 pub(crate) struct Watch {
     progress: Option<Py<PyAny>>,
-    looked: Instant,
-    told: Instant,
+    polled: Instant,
+    reported: Instant,
     /// Exception that stopped the run.
     pub(crate) raised: Option<PyErr>,
 }
@@ -28,26 +28,26 @@ pub(crate) struct Watch {
 impl Watch {
     pub(crate) fn new(progress: Option<Py<PyAny>>) -> Self {
         let now = Instant::now();
-        Self { progress, looked: now, told: now, raised: None }
+        Self { progress, polled: now, reported: now, raised: None }
     }
 
     /// Checks signals and reports `done` of `total`; breaks if the run must stop.
-    pub(crate) fn look(&mut self, done: f64, total: f64) -> ControlFlow<()> {
-        let looks = self.looked.elapsed() >= POLL_INTERVAL;
-        let tells = self.progress.is_some() && self.told.elapsed() >= TELL_EVERY;
-        if !looks && !tells {
+    pub(crate) fn poll(&mut self, done: f64, total: f64) -> ControlFlow<()> {
+        let checks_signals = self.polled.elapsed() >= POLL_INTERVAL;
+        let reports = self.progress.is_some() && self.reported.elapsed() >= TELL_EVERY;
+        if !checks_signals && !reports {
             return ControlFlow::Continue(());
         }
         let result = Python::attach(|py| {
             py.check_signals()?;
-            match (&self.progress, tells) {
+            match (&self.progress, reports) {
                 (Some(progress), true) => progress.call1(py, (done, total)).map(drop),
                 _ => Ok(()),
             }
         });
-        self.looked = Instant::now();
-        if tells {
-            self.told = self.looked;
+        self.polled = Instant::now();
+        if reports {
+            self.reported = self.polled;
         }
         self.keep(result)
     }

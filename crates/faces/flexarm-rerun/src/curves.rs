@@ -124,8 +124,8 @@ impl Curves {
     }
 
     /// Returns path, envelope and names of each group of curves.
-    pub(crate) fn seen(&self) -> impl Iterator<Item = CurveExtent> + '_ {
-        self.error.iter().chain(&self.causes).map(ScalarTrack::seen)
+    pub(crate) fn extents(&self) -> impl Iterator<Item = CurveExtent> + '_ {
+        self.error.iter().chain(&self.causes).map(ScalarTrack::extent)
     }
 }
 

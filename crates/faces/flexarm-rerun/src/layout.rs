@@ -15,7 +15,7 @@ use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLog
 use rerun::{AsComponents, EntityPath};
 
 use super::eye::Eye;
-use super::plot_room::{Corner, arrange};
+use super::plot_range::{Corner, arrange};
 use super::tracks::CurveExtent;
 
 const VIEW_3D: &str = "3D";
@@ -99,14 +99,14 @@ pub(crate) struct PlotPlace {
 
 /// Returns, for each plot, an axis that shows all its curves with labels, and a corner where the
 /// legend hides no curve.
-pub(crate) fn rooms(plots: &[PlotPlace], seen: &[CurveExtent]) -> Entities {
+pub(crate) fn plot_ranges(plots: &[PlotPlace], extents: &[CurveExtent]) -> Entities {
     let mut entities: Entities = Vec::new();
     for plot in plots {
-        let own: Vec<&CurveExtent> = seen.iter().filter(|seen| seen.path.starts_with(&plot.origin)).collect();
-        let names: Vec<usize> = own.iter().flat_map(|seen| seen.names.iter().copied()).collect();
-        let envelopes: Vec<_> = own.iter().map(|seen| &seen.envelope).collect();
-        let Some(room) = arrange(&envelopes, &names) else { continue };
-        let corner = match room.corner {
+        let own: Vec<&CurveExtent> = extents.iter().filter(|extent| extent.path.starts_with(&plot.origin)).collect();
+        let names: Vec<usize> = own.iter().flat_map(|extent| extent.names.iter().copied()).collect();
+        let envelopes: Vec<_> = own.iter().map(|extent| &extent.envelope).collect();
+        let Some(arrangement) = arrange(&envelopes, &names) else { continue };
+        let corner = match arrangement.corner {
             Corner { left: true, top: true } => Corner2D::LeftTop,
             Corner { left: false, top: true } => Corner2D::RightTop,
             Corner { left: true, top: false } => Corner2D::LeftBottom,
@@ -114,7 +114,7 @@ pub(crate) fn rooms(plots: &[PlotPlace], seen: &[CurveExtent]) -> Entities {
         };
         let at = |what: &str| EntityPath::from(format!("{}/{what}", plot.path).as_str());
         entities.push((at("PlotLegend"), Box::new(PlotLegend::new().with_corner(corner))));
-        entities.push((at("ScalarAxis"), Box::new(ScalarAxis::new().with_range(room.range))));
+        entities.push((at("ScalarAxis"), Box::new(ScalarAxis::new().with_range(arrangement.range))));
     }
     entities
 }
@@ -168,7 +168,7 @@ impl Layout {
         self.log(&format!("{}/ViewContents", placed.path), contents);
         if view.class == VIEW_PLOT {
             // The time axes of all plots zoom together; the legend gets its final corner once the
-            // curves are known ([`rooms`]).
+            // curves are known ([`plot_ranges`]).
             self.log(&format!("{}/PlotLegend", placed.path), PlotLegend::new().with_corner(Corner2D::LeftTop));
             self.log(&format!("{}/TimeAxis", placed.path), TimeAxis::new().with_link(LinkAxis::LinkToGlobal));
             self.plots.push(PlotPlace { origin: view.origin.clone(), path: placed.path.clone() });

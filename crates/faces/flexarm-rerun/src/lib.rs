@@ -4,7 +4,7 @@
 //! [`install`] makes the format known to `flexarm_log`: from then on runs, studies, maps and
 //! conversions write it. [`RrdRecorder`] records one run, `study` several in one view. `run` holds
 //! the contents of a run, made of `robot`s and `curves`; `tracks` buffers rows until they are worth
-//! a chunk; `window` defines the layout of the viewer, `layout` encodes it, `plot_room` finds axis
+//! a chunk; `window` defines the layout of the viewer, `layout` encodes it, `plot_range` finds axis
 //! ranges and legend corners; `stream` writes the file. Only this crate uses the `rerun` crate,
 //! whose interface changes about monthly.
 //!
@@ -23,7 +23,7 @@ mod curves;
 mod entity;
 mod eye;
 mod layout;
-mod plot_room;
+mod plot_range;
 mod robot;
 mod run;
 mod scenery;
@@ -41,7 +41,7 @@ use rerun::{EntityPath, TextDocument, ViewCoordinates};
 
 use self::entity::path;
 use self::layout::{Part, PlotPlace};
-use self::run::{RunTracks, Seat};
+use self::run::{RunRole, RunTracks};
 use self::stream::{Result, RrdStream, StreamError};
 use self::study::RrdStudy;
 use self::tracks::{CurveExtent, SIM_TIME};
@@ -103,8 +103,8 @@ impl OpenFile for RrdFile {
         options.create(path)?;
         let open = || -> Result<Self> {
             let mut store = Store::new(path, content_hash(header, &[]), options)?;
-            store.describe(header, &Seat::Alone)?;
-            let run = RunWriter::begin(&mut store, header, Seat::Alone, &[])?;
+            store.describe(header, &RunRole::Alone)?;
+            let run = RunWriter::begin(&mut store, header, RunRole::Alone, &[])?;
             Ok(Self { store, run, closed: false })
         };
         open().map_err(stream_error(path, "write the description of the run"))
@@ -159,22 +159,22 @@ pub(crate) struct Store {
     flush: FlushClock,
     /// Plots of the layout, once it is written, and the curves of all finished runs.
     plots: Vec<PlotPlace>,
-    seen: Vec<CurveExtent>,
+    extents: Vec<CurveExtent>,
 }
 
 impl Store {
     fn new(path: &Path, hash: u64, options: CreateOptions) -> Result<Self> {
         let stream = RrdStream::create(path, &format!("flexarm-{hash:016x}"))?;
-        Ok(Self { stream, flush: options.flush_clock(path), plots: Vec::new(), seen: Vec::new() })
+        Ok(Self { stream, flush: options.flush_clock(path), plots: Vec::new(), extents: Vec::new() })
     }
 
     /// Writes the data stored once in a recording.
-    fn describe(&self, header: &RunHeader, seat: &Seat) -> Result<()> {
+    fn describe(&self, header: &RunHeader, role: &RunRole) -> Result<()> {
         let stream = &self.stream;
-        stream.name(&match (seat, header.trajectory.is_empty()) {
-            (Seat::InStudy(..), _) => format!("study of {}", header.robot),
-            (Seat::Alone, true) => header.robot.clone(),
-            (Seat::Alone, false) => format!("{}: {}", header.robot, header.trajectory),
+        stream.name(&match (role, header.trajectory.is_empty()) {
+            (RunRole::InStudy(..), _) => format!("study of {}", header.robot),
+            (RunRole::Alone, true) => header.robot.clone(),
+            (RunRole::Alone, false) => format!("{}: {}", header.robot, header.trajectory),
         })?;
         stream.constant(&EntityPath::root(), &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         let text = summary(&header.description, &RunResult::default());
@@ -188,9 +188,9 @@ impl Store {
 
     /// Sets axis ranges and legend corners, now that all curves are known, and ends the file.
     fn finish(&mut self) -> Result<()> {
-        let rooms = layout::rooms(&self.plots, &self.seen);
-        if !rooms.is_empty() {
-            self.stream.show(&rooms, 1)?;
+        let ranges = layout::plot_ranges(&self.plots, &self.extents);
+        if !ranges.is_empty() {
+            self.stream.show(&ranges, 1)?;
         }
         self.stream.finish()
     }
@@ -210,12 +210,12 @@ pub(crate) struct RunWriter {
 }
 
 impl RunWriter {
-    fn begin(store: &mut Store, header: &RunHeader, seat: Seat, labels: &[String]) -> Result<Self> {
-        let tracks = RunTracks::new(header, &seat, &store.stream)?;
+    fn begin(store: &mut Store, header: &RunHeader, role: RunRole, labels: &[String]) -> Result<Self> {
+        let tracks = RunTracks::new(header, &role, &store.stream)?;
         header.scenery.iter().try_for_each(|scenery| scenery::write(&store.stream, scenery))?;
         store.stream.flush()?;
-        let has_layout = matches!(seat, Seat::Alone | Seat::InStudy(0, _));
-        let layout = has_layout.then(|| window::window(header, &seat, labels));
+        let has_layout = matches!(role, RunRole::Alone | RunRole::InStudy(0, _));
+        let layout = has_layout.then(|| window::window(header, &role, labels));
         // Surfaces and files are in the recording now; free their memory.
         let header = RunHeader { meshes: Vec::new(), attachments: Vec::new(), urdf: String::new(), ..header.clone() };
         Ok(Self { shape: Shape::of(&header), header, tracks, writings: 0, flushes: 0, layout, tools_due: true })
@@ -267,7 +267,7 @@ impl RunWriter {
         self.layout(store, None)?;
         self.tracks.close();
         self.tracks.send(&store.stream)?;
-        store.seen.extend(self.tracks.seen());
+        store.extents.extend(self.tracks.extents());
         self.tracks.ways(&store.stream)?;
         self.tracks.marks(&store.stream, result)
     }

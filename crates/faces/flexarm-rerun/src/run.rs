@@ -9,7 +9,7 @@ use super::colors::{self, ColorScale};
 use super::curves::Curves;
 use super::entity::path;
 use super::eye::{Eye, eye};
-use super::plot_room::Envelope;
+use super::plot_range::Envelope;
 use super::robot::{Paint, RobotAppearance, RobotTracks};
 use super::size;
 use super::stream::{Result, RrdStream};
@@ -19,14 +19,14 @@ use flexarm_log::{Event, EventKind, PoseClock, PoseReasons, RunHeader, RunResult
 
 /// Role of a run in its recording.
 #[derive(Clone, Debug)]
-pub(crate) enum Seat {
+pub(crate) enum RunRole {
     /// The only run.
     Alone,
     /// A run of a study, with its number from 0 and its label.
     InStudy(usize, String),
 }
 
-impl Seat {
+impl RunRole {
     /// Parent entity of the robots of the run.
     pub(crate) fn root(&self, header: &RunHeader) -> EntityPath {
         match self {
@@ -108,10 +108,10 @@ impl Fineness {
 }
 
 /// The first run of a study is opaque, the others are transparent.
-fn magnified_paint(seat: &Seat, scale: ColorScale) -> Paint {
-    match (seat, seat.color()) {
-        (Seat::InStudy(0, _), Some(color)) => Paint::Plain(color),
-        (Seat::InStudy(..), Some(color)) => {
+fn magnified_paint(role: &RunRole, scale: ColorScale) -> Paint {
+    match (role, role.color()) {
+        (RunRole::InStudy(0, _), Some(color)) => Paint::Plain(color),
+        (RunRole::InStudy(..), Some(color)) => {
             let [red, green, blue, _] = color.0.to_array();
             Paint::Plain(Color::from_unmultiplied_rgba(red, green, blue, 0x90))
         }
@@ -127,9 +127,9 @@ struct DrawnRobots {
 }
 
 impl DrawnRobots {
-    fn new(header: &RunHeader, seat: &Seat, scale: ColorScale, stream: &RrdStream) -> Result<Self> {
-        let root = seat.root(header);
-        let alone = matches!(seat, Seat::Alone);
+    fn new(header: &RunHeader, role: &RunRole, scale: ColorScale, stream: &RrdStream) -> Result<Self> {
+        let root = role.root(header);
+        let alone = matches!(role, RunRole::Alone);
         let Fineness { pixel_m, true_tolerance_m, quantum_m } = Fineness::of(header);
         let way = |who: &str| PathTrack::new(root.join(&path(["path", who])));
         let robot = |name: &str, paint: Paint, bends: bool, tolerance_m: f64, quantum_m: f32| {
@@ -142,7 +142,7 @@ impl DrawnRobots {
             let every_ns = if quantum_m > 0.0 { 10_000_000 } else { 100_000_000 };
             let root = root.join(&path([name]));
             // One frame of each name in a recording.
-            let frames = seat.is_first().then_some(prefix);
+            let frames = role.is_first().then_some(prefix);
             let look = RobotAppearance { root, frames, paint, bends, tolerance_m, every_ns, quantum_m };
             RobotTracks::new(header, look, stream)
         };
@@ -155,12 +155,12 @@ impl DrawnRobots {
             true => Some(robot("flexible", Paint::Own, true, true_tolerance_m, 0.0)?),
             false => None,
         };
-        let rigid = match header.has_rigid && seat.is_first() {
+        let rigid = match header.has_rigid && role.is_first() {
             true => Some(robot("rigid", Paint::Ghost, false, 0.0, 0.0)?),
             false => None,
         };
         let magnified = match with_magnified {
-            true => Some(robot("magnified", magnified_paint(seat, scale), true, pixel_m, quantum_m)?),
+            true => Some(robot("magnified", magnified_paint(role, scale), true, pixel_m, quantum_m)?),
             false => None,
         };
         Ok(Self {
@@ -173,7 +173,7 @@ impl DrawnRobots {
             magnified: with_magnified.then(|| Drawn {
                 robot: magnified,
                 way: way("magnified"),
-                way_color: seat.color(),
+                way_color: role.color(),
             }),
         })
     }
@@ -185,20 +185,20 @@ fn has_magnified(header: &RunHeader) -> bool {
 
 impl RunTracks {
     /// Creates the tracks of a run; writes its constant data.
-    pub(crate) fn new(header: &RunHeader, seat: &Seat, stream: &RrdStream) -> Result<Self> {
-        let root = seat.root(header);
+    pub(crate) fn new(header: &RunHeader, role: &RunRole, stream: &RrdStream) -> Result<Self> {
+        let root = role.root(header);
         let scale = ColorScale { full_m: header.color_scale_m };
-        let DrawnRobots { flexible, rigid, magnified } = DrawnRobots::new(header, seat, scale, stream)?;
+        let DrawnRobots { flexible, rigid, magnified } = DrawnRobots::new(header, role, scale, stream)?;
         let arrow = has_magnified(header).then(|| ArrowTrack::new(root.join(&path(["magnified", "error"]))));
         if let Some(arrow) = &arrow {
-            arrow.style(stream, seat.color().unwrap_or_else(colors::total))?;
+            arrow.style(stream, role.color().unwrap_or_else(colors::total))?;
         }
         let plots = path(["plots"]);
         let shapes = !header.captions.is_empty();
-        let curves = (seat.is_first() && !shapes).then(|| Curves::new(header, &plots));
-        let study_curves = match seat {
-            Seat::InStudy(_, label) if header.has_rigid => {
-                Some(Curves::of_study(label, &plots, seat.color().unwrap_or_else(|| colors::series(0))))
+        let curves = (role.is_first() && !shapes).then(|| Curves::new(header, &plots));
+        let study_curves = match role {
+            RunRole::InStudy(_, label) if header.has_rigid => {
+                Some(Curves::of_study(label, &plots, role.color().unwrap_or_else(|| colors::series(0))))
             }
             _ => None,
         };
@@ -338,13 +338,18 @@ impl RunTracks {
     }
 
     /// Returns path, envelope and names of each group of curves.
-    pub(crate) fn seen(&self) -> Vec<CurveExtent> {
-        let mut seen: Vec<CurveExtent> = self.curves.iter().chain(&self.study_curves).flat_map(Curves::seen).collect();
+    pub(crate) fn extents(&self) -> Vec<CurveExtent> {
+        let mut extents: Vec<CurveExtent> =
+            self.curves.iter().chain(&self.study_curves).flat_map(Curves::extents).collect();
         if let (Some((error, when, _)), Some(_)) = (&self.peak, &self.curves) {
             let names = vec![peak_label(*error, *when).chars().count()];
-            seen.push(CurveExtent { path: path(["plots", "tcp_error", "peak"]), envelope: Envelope::default(), names });
+            extents.push(CurveExtent {
+                path: path(["plots", "tcp_error", "peak"]),
+                envelope: Envelope::default(),
+                names,
+            });
         }
-        seen
+        extents
     }
 
     /// Number of samples whose rows are waiting.

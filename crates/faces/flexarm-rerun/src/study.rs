@@ -6,14 +6,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use rerun::TextDocument;
 
 use super::entity::path;
-use super::run::Seat;
+use super::run::RunRole;
 use super::{RunWriter, Store, content_hash, stream_error};
 use flexarm_log::{CreateOptions, LogError, Recorder, RunHeader, RunResult, Sample, StudyRecorder};
 
 /// A recording of several runs: each has its arm in its own colour (deflections magnified), its TCP
 /// path and its error; the first one also all curves and the rigid twin.
 ///
-/// The runs are recorded one after another, each through its seat ([`StudyRecorder::seat`]); time starts at zero for
+/// The runs are recorded one after another, each by its own recorder ([`StudyRecorder::recorder`]); time starts at zero for
 /// each.
 pub(crate) struct RrdStudy {
     path: PathBuf,
@@ -31,11 +31,11 @@ impl RrdStudy {
 }
 
 impl StudyRecorder for RrdStudy {
-    fn seat(&self, number: usize) -> Box<dyn Recorder> {
-        Box::new(StudySeat {
+    fn recorder(&self, number: usize) -> Box<dyn Recorder> {
+        Box::new(StudyRun {
             path: self.path.clone(),
             options: self.options,
-            seat: Seat::InStudy(number, self.labels[number].clone()),
+            role: RunRole::InStudy(number, self.labels[number].clone()),
             labels: self.labels.clone(),
             store: self.store.clone(),
             run: None,
@@ -62,16 +62,16 @@ impl Drop for RrdStudy {
 }
 
 /// Records one run of a study.
-struct StudySeat {
+struct StudyRun {
     path: PathBuf,
     options: CreateOptions,
-    seat: Seat,
+    role: RunRole,
     labels: Vec<String>,
     store: Arc<Mutex<Option<Store>>>,
     run: Option<RunWriter>,
 }
 
-impl Recorder for StudySeat {
+impl Recorder for StudyRun {
     fn check(&self) -> Result<(), LogError> {
         match lock(&self.store).is_some() {
             true => Ok(()), // created by this study
@@ -88,11 +88,11 @@ impl Recorder for StudySeat {
         if shared.is_none() {
             self.options.create(&self.path)?;
             let open = Store::new(&self.path, content_hash(header, &self.labels), self.options)
-                .and_then(|store| store.describe(header, &self.seat).map(|()| store));
+                .and_then(|store| store.describe(header, &self.role).map(|()| store));
             *shared = Some(open.map_err(stream_error(&self.path, "write the description of the study"))?);
         }
         let Some(store) = shared.as_mut() else { return Err(LogError::not_open(&self.path, "begin")) };
-        let run = RunWriter::begin(store, header, self.seat.clone(), &self.labels).map_err(error)?;
+        let run = RunWriter::begin(store, header, self.role.clone(), &self.labels).map_err(error)?;
         self.run = Some(run);
         Ok(())
     }
@@ -126,7 +126,7 @@ impl Recorder for StudySeat {
     }
 }
 
-impl Drop for StudySeat {
+impl Drop for StudyRun {
     /// Writes the last rows of an abandoned run; errors cannot be reported here.
     fn drop(&mut self) {
         if let (Some(store), Some(mut run)) = (lock(&self.store).as_mut(), self.run.take()) {

@@ -8,7 +8,7 @@ use rerun::{
     TimeColumn, Transform3D,
 };
 
-use super::plot_room::Envelope;
+use super::plot_range::Envelope;
 use super::stream::{Result, RrdStream};
 
 /// Name of the timeline of simulated time.
@@ -322,7 +322,7 @@ impl ScalarTrack {
         debug_assert!(self.values.len().is_multiple_of(self.names.len().max(1)), "{}: a value per curve", self.path);
     }
 
-    pub(crate) fn seen(&self) -> CurveExtent {
+    pub(crate) fn extent(&self) -> CurveExtent {
         let names = self.names.iter().map(|name| name.chars().count()).collect();
         CurveExtent { path: self.path.clone(), envelope: self.envelope.clone(), names }
     }

@@ -4,23 +4,23 @@ use rerun::EntityPath;
 
 use super::entity::path;
 use super::layout::Part;
-use super::run::Seat;
+use super::run::RunRole;
 use super::scenery;
 use flexarm_log::{GaugeQuantity, RunHeader, STRESS_VIEW};
 
 /// Lays out the robots with the result below, and the error and its causes beside them.
-pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
+pub(crate) fn window(header: &RunHeader, role: &RunRole, labels: &[String]) -> Part {
     if !header.scenery.is_empty() {
-        return scenery::window(header, &seat.root(header));
+        return scenery::window(header, &role.root(header));
     }
     if !header.captions.is_empty() {
-        return shapes(&seat.root(header));
+        return shapes(&role.root(header));
     }
     let plot = |title: &str, parts: &[&str]| Part::plot(title, path(["plots"].iter().chain(parts)));
     // Plots of the first run of a study carry its label.
-    let own = |title: &str| match seat {
-        Seat::Alone => title.to_owned(),
-        Seat::InStudy(_, label) => format!("{label}: {}{}", title[..1].to_lowercase(), &title[1..]),
+    let own = |title: &str| match role {
+        RunRole::Alone => title.to_owned(),
+        RunRole::InStudy(_, label) => format!("{label}: {}{}", title[..1].to_lowercase(), &title[1..]),
     };
     let cause = |title: &str, parts: &[&str]| plot(&own(title), parts);
     let shows = |quantity| header.gauges_of(quantity).next().is_some();
@@ -40,12 +40,12 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
     let moves = !header.contributors.is_empty() || header.magnification > 0.0 || header.elements.is_empty();
     // At most two plots below each other: with little space the viewer labels an axis at powers
     // of ten only.
-    let errors = match seat {
-        Seat::InStudy(..) => vec![
+    let errors = match role {
+        RunRole::InStudy(..) => vec![
             plot("TCP error of all runs [mm]", &["study", "error"]),
             plot("Across the path [mm]", &["study", "lateral"]),
         ],
-        Seat::Alone if header.has_rigid => [
+        RunRole::Alone if header.has_rigid => [
             Some(plot("TCP error [mm], world axes", &["tcp_error"])),
             moves.then(|| plot("Along and across the path [mm]", &["tcp_error_path"])),
             Some(plot("Rotation [mrad]", &["tcp_error_rotation"])),
@@ -53,7 +53,7 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
         .into_iter()
         .flatten()
         .collect(),
-        Seat::Alone => Vec::new(),
+        RunRole::Alone => Vec::new(),
     };
     let tabs = [errors, causes.into_iter().flatten().collect()];
     let right = tabs.into_iter().filter(|tabs| !tabs.is_empty()).map(|tabs| (1.0, Part::Tabs(tabs))).collect();
@@ -61,12 +61,12 @@ pub(crate) fn window(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part
     let text = match moves {
         true => {
             // The table of a study is wide.
-            let share = if matches!(seat, Seat::Alone) { 1.0 } else { 1.7 };
+            let share = if matches!(role, RunRole::Alone) { 1.0 } else { 1.7 };
             Part::Row(vec![(share, summary), (1.0, Part::log(&own("Events"), path(["events"])))])
         }
         false => summary,
     };
-    let left = Part::Column(vec![(5.8, robots(header, seat, labels)), (3.6, text)]);
+    let left = Part::Column(vec![(5.8, robots(header, role, labels)), (3.6, text)]);
     Part::Row(vec![(3.0, left), (2.0, Part::Column(right))])
 }
 
@@ -79,15 +79,15 @@ fn shapes(root: &EntityPath) -> Part {
 }
 
 /// Lays out the magnified robot and the one at true scale as tabs.
-fn robots(header: &RunHeader, seat: &Seat, labels: &[String]) -> Part {
+fn robots(header: &RunHeader, role: &RunRole, labels: &[String]) -> Part {
     let factor = header.magnification;
-    if let Seat::InStudy(..) = seat {
+    if let RunRole::InStudy(..) = role {
         let roots = labels.iter().map(|label| path([label]));
         let contents = roots.map(|root| format!("+ {root}/**")).collect();
         let title = format!("All runs, deflections x {factor}");
         return Part::scene(&title, EntityPath::root(), contents);
     }
-    let root = seat.root(header);
+    let root = role.root(header);
     let without = |hidden: &[&str]| {
         let hidden = hidden.iter().map(|what| format!("- {root}/{what}/**"));
         std::iter::once(format!("+ {root}/**")).chain(hidden).collect()

@@ -347,11 +347,11 @@ fn a_study_holds_all_its_runs_in_one_readable_file() {
     let write = || {
         let study = study(&path, vec!["one".into(), "two/2".into()]);
         for number in 0..2 {
-            let mut seat = study.seat(number);
-            seat.check().unwrap();
-            seat.begin(&synthetic::header()).unwrap();
-            (0..100).for_each(|step| seat.record(&synthetic::sample(step)).unwrap());
-            seat.finish(&synthetic::result()).unwrap();
+            let mut run = study.recorder(number);
+            run.check().unwrap();
+            run.begin(&synthetic::header()).unwrap();
+            (0..100).for_each(|step| run.record(&synthetic::sample(step)).unwrap());
+            run.finish(&synthetic::result()).unwrap();
         }
         study.finish("# Two runs").unwrap();
         std::fs::read(&path).unwrap()
@@ -391,9 +391,9 @@ fn recordings_of_different_set_ups_have_different_identities() {
     assert_ne!(identities[0], identities[2]);
     let path = synthetic::scratch("identity-study.rrd");
     let study = study(&path, vec!["one".into()]);
-    let mut seat = study.seat(0);
-    seat.begin(&header).unwrap();
-    seat.finish(&synthetic::result()).unwrap();
+    let mut run = study.recorder(0);
+    run.begin(&header).unwrap();
+    run.finish(&synthetic::result()).unwrap();
     study.finish("").unwrap();
     assert_ne!(identity(&std::fs::read(&path).unwrap()), identities[0]);
     std::fs::remove_file(path).unwrap();
@@ -403,13 +403,13 @@ fn recordings_of_different_set_ups_have_different_identities() {
 fn a_study_that_is_given_up_keeps_the_runs_it_has() {
     let path = synthetic::scratch("given-up.rrd");
     let study = study(&path, vec!["one".into(), "two".into()]);
-    let mut first = study.seat(0);
+    let mut first = study.recorder(0);
     first.begin(&synthetic::header()).unwrap();
     (0..100).for_each(|step| first.record(&synthetic::sample(step)).unwrap());
     first.finish(&synthetic::result()).unwrap();
     // If killed here, the first run would be in the file.
     assert_eq!(rows(&std::fs::read(&path).unwrap())["/plots/study/error/one"], 100);
-    let mut second = study.seat(1);
+    let mut second = study.recorder(1);
     second.begin(&synthetic::header()).unwrap();
     (0..10).for_each(|step| second.record(&synthetic::sample(step)).unwrap());
     drop((second, study));
@@ -549,10 +549,10 @@ fn a_study_has_its_runs_in_the_order_of_colours_and_says_whose_events_and_shares
     let labels = ["as given", "modal"];
     let study = study(&path, labels.map(str::to_owned).to_vec());
     for number in 0..2 {
-        let mut seat = study.seat(number);
-        seat.begin(&synthetic::header()).unwrap();
-        (0..50).for_each(|step| seat.record(&synthetic::sample(step)).unwrap());
-        seat.finish(&synthetic::result()).unwrap();
+        let mut run = study.recorder(number);
+        run.begin(&synthetic::header()).unwrap();
+        (0..50).for_each(|step| run.record(&synthetic::sample(step)).unwrap());
+        run.finish(&synthetic::result()).unwrap();
     }
     study.finish("# Two runs").unwrap();
     let file = std::fs::read(&path).unwrap();

@@ -191,15 +191,15 @@ pub mod report {
 /// Recordings of runs: formats, columns, conversion.
 pub mod recordings {
     pub use flexarm_log::{
-        Column, Columns, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, Holds, RecordingFormat, Sample,
-        Trace, flat_columns,
+        Column, Columns, ContentLevel, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, RecordingFormat,
+        Sample, Trace, flat_columns,
     };
     pub use flexarm_run::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
 }
 
 /// Flexible links from meshes and from matrices of other programs.
 pub mod links {
-    pub use flexarm_linkmaker::{JobError, LinkError, WordError, export, import};
+    pub use flexarm_linkmaker::{LinkError, WordError, export, import};
     pub use flexarm_run::reduce;
 }
 
@@ -212,10 +212,8 @@ pub mod files {
 pub mod errors {
     pub use flexarm_files::FileError;
     pub use flexarm_kinematics::BalancerCurveError;
-    pub use flexarm_motion_io::MotionError;
     pub use flexarm_new::NewError;
-    pub use flexarm_path::PathError;
-    pub use flexarm_run::{LoopError, RecordingError, RobotFileError};
+    pub use flexarm_run::{RecordingError, RobotFileError};
     pub use flexarm_stepping::StepError;
     pub use flexarm_trajectory::{ColumnMapError, TrajectoryError};
 }

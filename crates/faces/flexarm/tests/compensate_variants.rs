@@ -155,7 +155,7 @@ fn targets_at_which_the_arm_waits_under_a_force_are_corrected_for_it() {
     std::fs::write(&file, KRL).unwrap();
     let motion = Motion::load(&file, &robot).unwrap();
     let moves = motion.tool_path.clone().unwrap();
-    let arrives = moves.moves.iter().find(|of| of.line == 5).unwrap().span_s[1];
+    let arrives = moves.moves.iter().find(|of| of.place.line == Some(5)).unwrap().span_s[1];
     let force = Wrench::new([200.0, -100.0, -800.0].into(), [0.0, 30.0, 0.0].into());
     let push = TimedWrench::new(move |t| match (t - arrives) / 0.5 {
         s if (0.0..=1.0).contains(&s) => force * (1.0 + (40.0 * std::f64::consts::TAU * s).sin()),
@@ -176,7 +176,8 @@ fn targets_at_which_the_arm_waits_under_a_force_are_corrected_for_it() {
     // The second and the third target of the program as written.
     let again = Motion::load(&program.files[0], &robot).unwrap();
     let ends = |motion: &Motion, line: usize| {
-        let t = motion.tool_path.as_ref().unwrap().moves.iter().find(|of| of.line == line).unwrap().span_s[1];
+        let t =
+            motion.tool_path.as_ref().unwrap().moves.iter().find(|of| of.place.line == Some(line)).unwrap().span_s[1];
         let (mut q, mut v, mut a) = ([0.0; 6], [0.0; 6], [0.0; 6]);
         motion.trajectory.sample(t, &mut q, &mut v, &mut a);
         q

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use flexarm::errors::StepError;
+use flexarm::links::LinkError;
 use flexarm::links::reduce::{ReduceJob, ReduceOptions, UrdfEntry, reduce};
-use flexarm::links::{JobError, LinkError};
 use flexarm::motions::AppliedLoad;
 use flexarm::poses::ResponseRequest;
 use flexarm::settings::Setting;
@@ -96,10 +96,7 @@ fn what_the_link_maker_finds_has_one_place_beside_what_the_rest_finds() {
     // An invalid number of a job is an error of the link maker.
     let mesh = root().join("crates/links/flexarm-fe-io/tests/data/three_blocks_v41_ascii.msh");
     let error = refused(&ReduceJob { modes: Some(2000), ..ReduceJob::for_mesh(&mesh) });
-    assert!(
-        matches!(error, Error::Link(LinkError::Job(JobError::TooManyModes { found: 2000, most: 1000 }))),
-        "{error}"
-    );
+    assert!(matches!(error, Error::Link(LinkError::Job(_))), "{error}");
     assert_eq!(error.to_string(), "modes 2000: at most 1000 modes can be kept");
     // The robot of a job is read by the facade.
     let urdf =

@@ -306,14 +306,14 @@ fn what_no_tool_has_is_refused_and_what_few_have_is_told_with_its_slip() {
     }
     let usual =
         at(&kr210(), &folder.tool(&good).unwrap().at_speeds(vec![6000.0]), &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
-    let doubts = |code: &str| code.starts_with("tool-") || code == "unusual";
-    assert!(!usual.caveats.iter().any(|caveat| doubts(&caveat.code)), "{:?}", usual.caveats);
+    let findings = |code: &str| code.starts_with("tool-") || code == "unusual";
+    assert!(!usual.caveats.iter().any(|caveat| findings(&caveat.code)), "{:?}", usual.caveats);
     // Small cutters have light modes.
     let small = good.replace("diameter = 20.0", "diameter = 1.0").replace("ae = 5.0", "ae = 0.3");
     let small = small.replace("1200.0", "6000.0").replace("1.5e7", "1e6").replace("deepest = 20.0", "deepest = 2.0");
     let small = folder.tool(&small).unwrap().at_speeds(vec![40000.0]);
     let usual = at(&kr210(), &small, &[0.0, -1.0, 1.6, 0.0, 0.9, 0.0], &rigid);
-    assert!(!usual.caveats.iter().any(|caveat| doubts(&caveat.code)), "{:?}", usual.caveats);
+    assert!(!usual.caveats.iter().any(|caveat| findings(&caveat.code)), "{:?}", usual.caveats);
 }
 
 /// A path in mm/min where mm/s are expected moves the tool by millimetres from tooth to tooth.

@@ -158,7 +158,7 @@ fn a_motion_over_a_dead_point_or_out_of_reach_is_refused_with_time_and_loop() {
     // The lever becomes parallel to the lower arm with the elbow at 125 degrees.
     let error = run(&[[0.0, 0.0, 0.3, 0.0], [0.0, -0.4, 2.5, 0.0]]);
     assert!(
-        error.contains("at t = 0.") && error.contains("\"drive of the upper arm\" passes its dead point"),
+        error.contains("\"drive of the upper arm\": at t = 0.") && error.contains("passes its dead point"),
         "{error}"
     );
     // A rod that is too short cannot close the loop everywhere.
@@ -169,7 +169,7 @@ fn a_motion_over_a_dead_point_or_out_of_reach_is_refused_with_time_and_loop() {
     short.rigid.loops.push(own);
     let far = [0.0, 0.6, -0.6, 0.0];
     let error = inspect(&short, Some(&order(far)), None).unwrap_err().to_string();
-    assert!(error.contains("loop \"short\" does not close there"), "{error}");
+    assert!(error.contains("loop \"short\": it does not close there"), "{error}");
     assert!(short.model(&Modelling::default()).unwrap().statics(Some(&order(far)), [0.0; 6]).is_err());
 }
 

@@ -75,7 +75,7 @@ fn rigid_parts_that_do_not_converge_to_their_casting_are_a_caveat_of_every_verb(
         let robot = Robot::load(shipped(bar)).unwrap();
         for n in [2, 3, 5] {
             let arm = robot.model(&parts(n)).unwrap();
-            assert!(!arm.doubts.iter().any(|caveat| caveat.code == "parts-off"), "{bar} {n}: {:?}", arm.doubts);
+            assert!(!arm.findings.iter().any(|caveat| caveat.code == "parts-off"), "{bar} {n}: {:?}", arm.findings);
         }
     }
 }

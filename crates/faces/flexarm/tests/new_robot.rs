@@ -300,9 +300,9 @@ fn one_mass_for_all_links_is_told_and_a_total_mass_is_spread_by_volume_or_length
         let folder = Folder::new(&format!("placeholder-{shapes}"));
         let urdf = equal_masses(2.0, lengths, shapes);
         let told = made(&folder, &urdf, &NewOptions::default());
-        let doubt = told.assumptions.iter().find(|a| a.about == "masses").unwrap();
-        assert!(doubt.text.contains("5 links have 2 kg each"), "{}", doubt.text);
-        assert!(doubt.mend.contains("inertia_from_total_mass"), "{}", doubt.mend);
+        let finding = told.assumptions.iter().find(|a| a.about == "masses").unwrap();
+        assert!(finding.text.contains("5 links have 2 kg each"), "{}", finding.text);
+        assert!(finding.mend.contains("inertia_from_total_mass"), "{}", finding.mend);
         let mut options = NewOptions::default();
         options.urdf.inertia_from_mesh = Some(InertiaEstimate::TotalMass(34.0));
         let folder = Folder::new(&format!("spread-{shapes}"));

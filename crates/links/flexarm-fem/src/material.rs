@@ -140,14 +140,14 @@ impl Material {
     /// because of a wrong unit.
     ///
     /// * `units`: units of the file, so that the message shows the value as written there.
-    pub fn doubts(&self, units: &UnitSystem) -> Vec<String> {
-        let mut doubts = Vec::new();
+    pub fn warnings(&self, units: &UnitSystem) -> Vec<String> {
+        let mut warnings = Vec::new();
         let written = |value: f64, unit: f64| match *units == UnitSystem::SI {
             true => String::new(),
             false => format!(" ({:.4e} in units {units})", value / unit),
         };
         if !MODULI.contains(&self.E) {
-            doubts.push(format!(
+            warnings.push(format!(
                 "Young's modulus E is {:.3e} Pa{}; solids have {:.0e} to {:.1e} Pa{}",
                 self.E,
                 written(self.E, units.stress()),
@@ -157,7 +157,7 @@ impl Material {
             ));
         }
         if !DENSITIES.contains(&self.rho) {
-            doubts.push(format!(
+            warnings.push(format!(
                 "the density is {:.3e} kg/m3{}; solids have {} to {} kg/m3{}",
                 self.rho,
                 written(self.rho, units.density()),
@@ -167,7 +167,7 @@ impl Material {
             ));
         }
         if !RATIOS.contains(&self.nu) {
-            doubts.push(format!(
+            warnings.push(format!(
                 "Poisson's ratio nu is {}; metals have 0.25 to 0.35, other solids {} to {}{}",
                 self.nu,
                 RATIOS.start(),
@@ -175,7 +175,7 @@ impl Material {
                 if self.nu < 0.0 { ": is the sign right?" } else { ": is rubber meant?" }
             ));
         }
-        doubts
+        warnings
     }
 }
 
@@ -259,10 +259,10 @@ mod tests {
     #[test]
     fn a_slip_of_the_unit_is_told_with_the_value_in_the_file_and_the_slip() {
         let mm: UnitSystem = "mm-t-s".parse().unwrap();
-        let doubt = |material: Material, units: &UnitSystem| material.doubts(units).join("; ");
-        let pa_in_mpa = doubt(Material::isotropic(2.1e11 * mm.stress(), 0.3, 7850.0), &mm);
+        let finding = |material: Material, units: &UnitSystem| material.warnings(units).join("; ");
+        let pa_in_mpa = finding(Material::isotropic(2.1e11 * mm.stress(), 0.3, 7850.0), &mm);
         assert!(pa_in_mpa.contains("2.1000e11 in units mm-t-s") && pa_in_mpa.contains("Pa where"), "{pa_in_mpa}");
-        let kg_in_t = doubt(Material::isotropic(2.1e11, 0.3, 7850.0 * mm.density()), &mm);
+        let kg_in_t = finding(Material::isotropic(2.1e11, 0.3, 7850.0 * mm.density()), &mm);
         assert!(kg_in_t.contains("7.8500e3 in units mm-t-s") && kg_in_t.contains("t/mm3"), "{kg_in_t}");
         for (E, nu, rho, word) in [
             (2.1e5, 0.3, 7850.0, "given in MPa"),
@@ -273,7 +273,7 @@ mod tests {
             (2.1e11, 0.5, 7850.0, "rubber"),
             (2.1e11, -0.9, 7850.0, "sign"),
         ] {
-            let said = doubt(Material::isotropic(E, nu, rho), &UnitSystem::SI);
+            let said = finding(Material::isotropic(E, nu, rho), &UnitSystem::SI);
             assert!(said.contains(word), "{E} {nu} {rho}: {said}");
         }
     }
@@ -295,7 +295,7 @@ mod tests {
             (370e9, 0.22, 3900.0),
             (0.6e9, 0.45, 950.0),
         ] {
-            assert_eq!(Material::isotropic(E, nu, rho).doubts(&UnitSystem::SI), Vec::<String>::new());
+            assert_eq!(Material::isotropic(E, nu, rho).warnings(&UnitSystem::SI), Vec::<String>::new());
         }
     }
 

@@ -178,29 +178,29 @@ pub struct MeshGate {
 }
 
 impl MeshGate {
-    /// Relative force under rigid motion above which [`Self::doubts`] warns.
+    /// Relative force under rigid motion above which [`Self::findings`] warns.
     pub const RIGID_BODY_RESIDUAL: f64 = 1e-7;
-    /// Relative difference of mass and inertia above which [`Self::doubts`] warns.
+    /// Relative difference of mass and inertia above which [`Self::findings`] warns.
     pub const MASS_ERROR: f64 = 1e-6;
-    /// Residual of a mode above which [`Self::doubts`] warns. The relative error of the squared
+    /// Residual of a mode above which [`Self::findings`] warns. The relative error of the squared
     /// frequency is below the residual; in thin plates rounding alone gives 1e-6.
     pub const MODE_RESIDUAL: f64 = 1e-5;
-    /// Jacobian at a node, relative to the mean of its element, below which [`Self::doubts`] warns.
+    /// Jacobian at a node, relative to the mean of its element, below which [`Self::findings`] warns.
     pub const SMALLEST_JACOBIAN: f64 = 0.05;
     /// Volume of an element, relative to the ideal shape, below which the element counts as flat.
     pub const SMALLEST_FULLNESS: f64 = 0.01;
-    /// Fraction of flat elements above which [`Self::doubts`] warns.
+    /// Fraction of flat elements above which [`Self::findings`] warns.
     pub const FEW_FLAT: f64 = 1e-3;
-    /// Offset of a mid-side node, relative to its edge length, above which [`Self::doubts`] warns:
+    /// Offset of a mid-side node, relative to its edge length, above which [`Self::findings`] warns:
     /// an arc of 140 degrees.
     pub const LARGEST_OFFSET: f64 = 0.35;
 
     /// Returns warnings about results that pass but are suspicious.
-    pub fn doubts(&self) -> Vec<Finding> {
-        let mut doubts = Vec::new();
+    pub fn findings(&self) -> Vec<Finding> {
+        let mut findings = Vec::new();
         let mut see = |code: &'static str, value: f64, usual: f64, bad: bool, sentence: String| {
             if bad {
-                doubts.push(Finding::warning(code, "", sentence, "").measured(value, usual));
+                findings.push(Finding::warning(code, "", sentence, "").measured(value, usual));
             }
         };
         let (residual, usual) = (self.rigid_body_residual, Self::RIGID_BODY_RESIDUAL);
@@ -214,23 +214,23 @@ impl MeshGate {
         see("mass", mass.max(inertia), usual, !(mass < usual && inertia < usual), said);
         let (residual, usual) = (self.mode_residual, Self::MODE_RESIDUAL);
         see("mode-residual", residual, usual, !(residual < usual), format!("a mode has a residual of {residual:.1e}"));
-        doubts.extend(self.quality.doubts());
-        doubts.extend(self.order.as_ref().and_then(OrderCheck::doubt));
-        doubts
+        findings.extend(self.quality.findings());
+        findings.extend(self.order.as_ref().and_then(OrderCheck::warning));
+        findings
     }
 }
 
 impl ElementQuality {
     /// Warnings about folded, flat or bent elements.
-    fn doubts(&self) -> Vec<Finding> {
-        let mut doubts = Vec::new();
+    fn findings(&self) -> Vec<Finding> {
+        let mut findings = Vec::new();
         let (value, usual) = (self.smallest_at_nodes, MeshGate::SMALLEST_JACOBIAN);
         if value < usual {
             let said = format!(
                 "element {} is nearly folded: its Jacobian at a node is {value:.3} of its mean, usual is above {usual}",
                 self.worst_element
             );
-            doubts.push(Finding::warning("folded-element", "", said, "").measured(value, usual));
+            findings.push(Finding::warning("folded-element", "", said, "").measured(value, usual));
         }
         let (value, usual) = (self.smallest_fullness, MeshGate::SMALLEST_FULLNESS);
         // One sliver among thousands of elements stiffens only its neighbourhood.
@@ -240,7 +240,7 @@ impl ElementQuality {
                  shape with such edges, usual is above {usual}; such slivers are far too stiff: mesh anew, or optimise the mesh",
                 self.flat_elements, self.flattest_element
             );
-            doubts.push(Finding::warning("sliver", "", said, "").measured(value, usual));
+            findings.push(Finding::warning("sliver", "", said, "").measured(value, usual));
         }
         let (value, usual) = (self.largest_offset, MeshGate::LARGEST_OFFSET);
         if value > usual {
@@ -248,9 +248,9 @@ impl ElementQuality {
                 "a mid-side node of element {} is off the middle of its edge by {value:.2} of the edge's length, usually below {usual}: is it in the wrong place, or the mesh too coarse for the curve?",
                 self.bent_element
             );
-            doubts.push(Finding::warning("mid-side-node", "", said, "").measured(value, usual));
+            findings.push(Finding::warning("mid-side-node", "", said, "").measured(value, usual));
         }
-        doubts
+        findings
     }
 }
 

@@ -57,7 +57,7 @@ impl OrderCheck {
     }
 
     /// Warning if the worst ratio is out of bounds.
-    pub fn doubt(&self) -> Option<Finding> {
+    pub fn warning(&self) -> Option<Finding> {
         let worst = self.worst();
         if worst < Self::LARGEST_RATIO && worst > 1.0 / Self::LARGEST_RATIO {
             return None;

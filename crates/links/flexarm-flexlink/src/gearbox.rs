@@ -105,58 +105,17 @@ pub struct GearSpring {
     pub K: DMatrix<f64>,
 }
 
-/// Reason why a gearbox is invalid.
+/// Reason why a gearbox is invalid, with the name of its joint.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum GearboxError {
-    /// There is no such joint, or it does not move and has a single stiffness.
-    #[error("gearbox of joint {joint:?}: the robot has no such movable joint")]
-    NoJoint {
-        /// The joint.
-        joint: String,
-    },
-    /// A dependent joint of a closed loop has no motor.
-    #[error("gearbox of joint {joint:?}: the joint follows from loop {name:?}, so nothing drives it")]
-    Dependent {
-        /// The joint.
-        joint: String,
-        /// The loop.
-        name: String,
-    },
-    /// The stiffness is not positive definite.
-    #[error(
-        "gearbox of joint {joint:?}: its stiffness must be positive (definite), found {found:e} as its smallest value"
-    )]
-    NotPositive {
-        /// The joint.
-        joint: String,
-        /// Minimum eigenvalue or entry, or the non-finite entry.
-        found: f64,
-    },
-    /// The stiffness is not symmetric.
-    #[error(
-        "gearbox of joint {joint:?}: its 6x6 stiffness must be symmetric, found a relative asymmetry of {found:.1e}"
-    )]
-    NotSymmetric {
-        /// The joint.
-        joint: String,
-        /// Maximum difference from the transpose, relative to the maximum entry.
-        found: f64,
-    },
-    /// A guide is on a joint that does not slide, or tilts about no axis.
-    #[error(
-        "guide of joint {joint:?}: only a prismatic joint has tubes that slide, and a guide tilts about one axis at least"
-    )]
-    NoGuide {
-        /// The joint.
-        joint: String,
-    },
-    /// A tilting gearbox is on a prismatic joint.
-    #[error("gearbox of joint {joint:?}: three stiffnesses are about the axes of a turning joint; this one slides")]
-    Slides {
-        /// The joint.
-        joint: String,
-    },
+#[error("{0}")]
+pub struct GearboxError(String);
+
+fn invalid(joint: &str, what: &str) -> GearboxError {
+    GearboxError(format!("gearbox of joint {joint:?}: {what}"))
+}
+
+fn not_positive(joint: &str, found: f64) -> GearboxError {
+    invalid(joint, &format!("its stiffness must be positive (definite), found {found:e} as its smallest value"))
 }
 
 /// Maximum relative asymmetry of a full stiffness.
@@ -172,7 +131,8 @@ fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), Gearbox
             None => {
                 let found = (K - K.transpose()).amax() / K.amax();
                 if found > ASYMMETRY {
-                    return Err(GearboxError::NotSymmetric { joint: joint.to_owned(), found });
+                    let must = "its 6x6 stiffness must be symmetric, found a relative asymmetry of";
+                    return Err(invalid(joint, &format!("{must} {found:.1e}")));
                 }
                 K.symmetric_eigenvalues().min()
             }
@@ -180,7 +140,7 @@ fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), Gearbox
         GearStiffness::Guide(_) => 1.0,
     };
     if smallest <= 0.0 || !smallest.is_finite() {
-        return Err(GearboxError::NotPositive { joint: joint.to_owned(), found: smallest });
+        return Err(not_positive(joint, smallest));
     }
     Ok(())
 }
@@ -233,9 +193,10 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
     let mut springs = Vec::new();
     for gearbox in gearboxes {
         let name = &gearbox.joint;
-        let missing = || GearboxError::NoJoint { joint: name.clone() };
+        let missing = || invalid(name, "the robot has no such movable joint");
         if let Some(closure) = mechanism.loops.iter().find(|closure| closure.dependent.contains(name)) {
-            return Err(GearboxError::Dependent { joint: name.clone(), name: closure.name.clone() });
+            let what = format!("the joint follows from loop {:?}, so nothing drives it", closure.name);
+            return Err(invalid(name, &what));
         }
         let joint = mechanism.joints.iter_mut().find(|j| j.name == *name).ok_or_else(missing)?;
         let several = !matches!(gearbox.stiffness, GearStiffness::Axis(_));
@@ -245,17 +206,18 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             return Err(missing());
         }
         if joint.kind.slides() && matches!(gearbox.stiffness, GearStiffness::Tilting(_)) {
-            return Err(GearboxError::Slides { joint: name.clone() });
+            return Err(invalid(name, "three stiffnesses are about the axes of a turning joint; this one slides"));
         }
         check_stiffness(name, &gearbox.stiffness)?;
         let found = gearbox.seat.map_or(1.0, |seat| smallest_of(&seat));
         if found <= 0.0 || !found.is_finite() {
-            return Err(GearboxError::NotPositive { joint: name.clone(), found });
+            return Err(not_positive(name, found));
         }
         if let GearStiffness::Guide(tubes) = &gearbox.stiffness
             && !(matches!(joint.kind, JointKind::Prismatic(_)) && tubes.tilts.contains(&true))
         {
-            return Err(GearboxError::NoGuide { joint: name.clone() });
+            let needs = "only a prismatic joint has tubes that slide, and a guide tilts about one axis at least";
+            return Err(GearboxError(format!("guide of joint {name:?}: {needs}")));
         }
         let slide = joint.clone();
         let motor = format!("{name}__motor");

@@ -53,7 +53,7 @@ pub(crate) fn substitute_modal(
     modal: &Arc<ModalLink>,
 ) -> Result<FlexibleSpan, SubstitutionError> {
     let (name, reduced) = (&flexible.link, &flexible.reduced);
-    let fail = |what: String| SubstitutionError::Modal { link: name.clone(), what };
+    let fail = |what: String| cannot_bend(name, &what);
     // Check that the first interface is at B.
     let Some(far) = modal.interfaces.first() else { return Err(fail("it has one interface only".into())) };
     let distance = (far.X_LI.translation.vector - site.p_LB).norm();
@@ -91,13 +91,17 @@ pub(crate) fn substitute_modal(
     })
 }
 
+fn cannot_bend(link: &str, what: &str) -> SubstitutionError {
+    SubstitutionError::Unfit(format!("link {link:?} cannot bend in modes: {what}"))
+}
+
 /// Replaces the mass integrals of the undeformed body by those of the mechanism's link; returns
 /// whether a body with them has the mode shapes, and leaves the body unchanged if not.
 fn take_mass_integrals(body: &mut ModalBody, name: &str, site: &Site) -> Result<bool, SubstitutionError> {
     let own = site.own(name)?.spatial();
     if (own.mass / body.mass - 1.0).abs() > 1e-9 {
         let what = format!("it weighs {} kg, the link {} kg", body.mass, own.mass);
-        return Err(SubstitutionError::Modal { link: name.to_owned(), what });
+        return Err(cannot_bend(name, &what));
     }
     let before = (body.first_moment, body.inertia);
     (body.first_moment, body.inertia) = (own.first_moment, own.rotational);

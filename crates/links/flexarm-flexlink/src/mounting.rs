@@ -32,69 +32,44 @@ pub struct Mounting {
     pub inertia: Option<LinkInertia>,
 }
 
-/// Reason why a mounting is invalid.
+/// Reason why a mounting is invalid, with its name.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum MountingError {
-    /// The name is already used by a link.
-    #[error("mounting {name:?}: the robot has a link of that name; call the mounting otherwise with name = \"...\"")]
-    NameTaken {
-        /// The name.
-        name: String,
-    },
-    /// The tree has no single root.
-    #[error("mounting {name:?}: the robot has no single base link to stand on it, found {roots:?}")]
-    NoBase {
-        /// The mounting.
-        name: String,
-        /// Links without parent joint.
-        roots: Vec<String>,
-    },
-    /// The stiffness is not positive definite.
-    #[error(
-        "mounting {name:?}: its stiffness must be finite and positive definite, found {found:e} as its smallest value"
-    )]
-    NotPositive {
-        /// The mounting.
-        name: String,
-        /// Minimum eigenvalue of the scaled matrix, minimum diagonal entry, or the non-finite
-        /// entry.
-        found: f64,
-    },
-    /// The stiffness is not symmetric.
-    #[error("mounting {name:?}: its 6x6 stiffness must be symmetric, found a relative asymmetry of {found:.1e}")]
-    NotSymmetric {
-        /// The mounting.
-        name: String,
-        /// Maximum difference from the transpose, relative to the maximum entry.
-        found: f64,
-    },
+#[error("mounting {0:?}: {1}")]
+pub struct MountingError(String, String);
+
+fn invalid(mounting: &str, what: impl Into<String>) -> MountingError {
+    MountingError(mounting.to_owned(), what.into())
 }
 
 /// Returns the link without parent joint.
 ///
 /// # Errors
-/// [`MountingError::NoBase`] if there is not exactly one.
+/// [`MountingError`] if there is not exactly one.
 pub fn base_link<'m>(mechanism: &'m Mechanism, mounting: &str) -> Result<&'m Link, MountingError> {
     let carried = |link: &Link| mechanism.joints.iter().any(|joint| joint.child == link.name);
     let roots: Vec<&Link> = mechanism.links.iter().filter(|link| !carried(link)).collect();
     match roots[..] {
         [one] => Ok(one),
         _ => {
-            let roots = roots.iter().map(|link| link.name.clone()).collect();
-            Err(MountingError::NoBase { name: mounting.to_owned(), roots })
+            let roots: Vec<&String> = roots.iter().map(|link| &link.name).collect();
+            let what = format!("the robot has no single base link to stand on it, found {roots:?}");
+            Err(invalid(mounting, what))
         }
     }
 }
 
 fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
-    let not_positive = |found: f64| Err(MountingError::NotPositive { name: name.to_owned(), found });
+    let not_positive = |found: f64| {
+        let must = "its stiffness must be finite and positive definite";
+        Err(invalid(name, format!("{must}, found {found:e} as its smallest value")))
+    };
     if let Some(hole) = K.iter().find(|k| !k.is_finite()) {
         return not_positive(*hole);
     }
     let asymmetry = (K - K.transpose()).amax() / K.amax();
     if asymmetry > ASYMMETRY {
-        return Err(MountingError::NotSymmetric { name: name.to_owned(), found: asymmetry });
+        let must = "its 6x6 stiffness must be symmetric";
+        return Err(invalid(name, format!("{must}, found a relative asymmetry of {asymmetry:.1e}")));
     }
     // Forces and moments have different units, so the matrix is scaled to a unit diagonal.
     let diagonal = K.diagonal();
@@ -120,7 +95,8 @@ pub fn insert_mounting(
     let Mounting { name, X_BS, K_S, separate, inertia } = mounting;
     let top = format!("{name}__top");
     if let Some(taken) = [name, &top].into_iter().find(|name| mechanism.link(name).is_some()) {
-        return Err(MountingError::NameTaken { name: taken.clone() });
+        let mend = "call the mounting otherwise with name = \"...\"";
+        return Err(invalid(taken, format!("the robot has a link of that name; {mend}")));
     }
     let base = base_link(mechanism, name)?.name.clone();
     check_stiffness(name, K_S)?;

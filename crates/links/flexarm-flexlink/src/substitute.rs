@@ -7,7 +7,7 @@ use flexarm_fem::{ModalLink, ReducedLink, RigidPart, drop_coupling};
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::{Matrix6, Vector3};
 
-use crate::cut::{CutError, SharedInertia, cut_chain, cut_inertia, share_inertia};
+use crate::cut::{SharedInertia, cut_chain, cut_inertia, share_inertia};
 use crate::interfaces::{BranchJoint, branch_joints};
 use crate::modal::substitute_modal;
 
@@ -143,12 +143,6 @@ pub enum SubstitutionError {
         /// Names of the existing links.
         known: Vec<String>,
     },
-    /// A link is listed twice.
-    #[error("flexible link {link:?} is listed twice")]
-    Twice {
-        /// The link.
-        link: String,
-    },
     /// The distal joint is ambiguous.
     #[error("link {link:?} has {} joints that lead on ({children:?}): name the one at the far interface with distal = \"...\"", children.len())]
     DistalUnclear {
@@ -157,64 +151,10 @@ pub enum SubstitutionError {
         /// Its child joints.
         children: Vec<String>,
     },
-    /// The named joint is not a child of the link.
-    #[error("distal joint {joint:?} does not start at link {link:?}; its joints are {children:?}")]
-    NotAChild {
-        /// The link.
-        link: String,
-        /// Requested joint.
-        joint: String,
-        /// Its child joints.
-        children: Vec<String>,
-    },
-    /// Interface B of the reduced link is not at the joint.
-    #[error(
-        "link {link:?}: interface B of the reduced link lies {distance:.3e} m from joint {joint:?}: check units and frames of the reduced link"
-    )]
-    InterfaceElsewhere {
-        /// The link.
-        link: String,
-        /// The distal joint.
-        joint: String,
-        /// Distance (m).
-        distance: f64,
-    },
-    /// A link without mass cannot be divided.
-    #[error("link {link:?} has no inertia to cut: give the parts in a .flex file or use parts = \"uniform\"")]
-    NoInertia {
-        /// The link.
-        link: String,
-    },
-    /// The modal link does not fit the mechanism.
-    #[error("link {link:?} cannot bend in modes: {what}")]
-    Modal {
-        /// The link.
-        link: String,
-        /// Reason.
-        what: String,
-    },
-    /// A joint is at an interface that lumped parts do not represent.
-    #[error(
-        "joint {joint:?} hangs on interface {interface:?} of link {link:?}, which is neither its near nor its far end: rigid parts with \
-         springs carry load at the two ends alone, let the link bend in modes"
-    )]
-    Branched {
-        /// The link.
-        link: String,
-        /// The joint.
-        joint: String,
-        /// The interface.
-        interface: String,
-    },
-    /// The mass properties cannot be divided.
-    #[error("the mass of link {link:?} cannot be spread along it: {source}")]
-    Cut {
-        /// The link.
-        link: String,
-        /// Cause.
-        #[source]
-        source: CutError,
-    },
+    /// A link, its reduced form or its joints do not fit the mechanism: what was found, and the
+    /// remedy.
+    #[error("{0}")]
+    Unfit(String),
 }
 
 /// Maximum distance of the reduced link's B from the joint, relative to the link's length.
@@ -223,8 +163,8 @@ const INTERFACE_TOLERANCE: f64 = 1e-6;
 /// Finds the joint at the distal interface of a link.
 ///
 /// # Errors
-/// [`SubstitutionError::UnknownLink`], [`SubstitutionError::DistalUnclear`] or
-/// [`SubstitutionError::NotAChild`].
+/// [`SubstitutionError::UnknownLink`], [`SubstitutionError::DistalUnclear`], or
+/// [`SubstitutionError::Unfit`] if the named joint does not start at the link.
 pub fn distal_joint<'m>(
     mechanism: &'m Mechanism,
     link: &'m str,
@@ -238,10 +178,9 @@ pub fn distal_joint<'m>(
     let names = || children.iter().map(|j| j.name.clone()).collect::<Vec<_>>();
     let moving: Vec<&&Joint> = children.iter().filter(|j| j.kind != JointKind::Fixed).collect();
     match named {
-        Some(joint) => children.iter().find(|j| j.name == joint).copied().ok_or_else(|| SubstitutionError::NotAChild {
-            link: link.to_owned(),
-            joint: joint.to_owned(),
-            children: names(),
+        Some(joint) => children.iter().find(|j| j.name == joint).copied().ok_or_else(|| {
+            let (joints, start) = (names(), "does not start at link");
+            SubstitutionError::Unfit(format!("distal joint {joint:?} {start} {link:?}; its joints are {joints:?}"))
         }),
         None => match (moving.as_slice(), children.as_slice()) {
             ([one], _) => Ok(one),
@@ -266,14 +205,18 @@ pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Subst
     result.mechanism.keep_coordinate_order();
     for (i, flexible) in links.iter().enumerate() {
         if links[..i].iter().any(|other| other.link == flexible.link) {
-            return Err(SubstitutionError::Twice { link: flexible.link.clone() });
+            return Err(SubstitutionError::Unfit(format!("flexible link {:?} is listed twice", flexible.link)));
         }
         let site = Site::new(&result.mechanism, flexible)?;
         let span = match &flexible.form {
             LinkForm::Modal(modal) => substitute_modal(&mut result.mechanism, flexible, &site, modal)?,
             LinkForm::TwoParts | LinkForm::Chain(_) => {
                 if let Some(BranchJoint { joint, interface }) = branch_joints(mechanism, flexible).into_iter().next() {
-                    return Err(SubstitutionError::Branched { link: flexible.link.clone(), joint, interface });
+                    return Err(SubstitutionError::Unfit(format!(
+                        "joint {joint:?} hangs on interface {interface:?} of link {:?}, which is neither its near nor its \
+                         far end: rigid parts with springs carry load at the two ends alone, let the link bend in modes",
+                        flexible.link
+                    )));
                 }
                 let chain = lumped_parts(flexible, &site)?;
                 let (span, springs) = insert_chain(&mut result.mechanism, flexible, &site, chain);
@@ -303,8 +246,11 @@ impl Site {
         let length = (p_LB - p_LA).norm();
         let distance = (distal.X_PJ.translation.vector - p_LB).norm();
         if distance > INTERFACE_TOLERANCE * length {
-            let (link, joint) = (name.clone(), distal.name.clone());
-            return Err(SubstitutionError::InterfaceElsewhere { link, joint, distance });
+            return Err(SubstitutionError::Unfit(format!(
+                "link {name:?}: interface B of the reduced link lies {distance:.3e} m from joint {:?}: check units and \
+                 frames of the reduced link",
+                distal.name
+            )));
         }
         let own = mechanism.link(name).and_then(|l| l.inertia);
         Ok(Self { distal_joint: distal.name.clone(), p_LA, p_LB, length, own })
@@ -312,14 +258,19 @@ impl Site {
 
     /// Returns the mechanism's own inertia of the link.
     pub(crate) fn own(&self, link: &str) -> Result<LinkInertia, SubstitutionError> {
-        self.own.ok_or_else(|| SubstitutionError::NoInertia { link: link.to_owned() })
+        self.own.ok_or_else(|| {
+            let mend = "give the parts in a .flex file or use parts = \"uniform\"";
+            SubstitutionError::Unfit(format!("link {link:?} has no inertia to cut: {mend}"))
+        })
     }
 }
 
 /// Divides the mechanism's own inertia of a link into its beam and bodies at its two ends.
 pub(crate) fn shared(flexible: &FlexibleLink, site: &Site) -> Result<SharedInertia, SubstitutionError> {
-    share_inertia(&site.own(&flexible.link)?, [&flexible.reduced.proximal, &flexible.reduced.distal])
-        .map_err(|source| SubstitutionError::Cut { link: flexible.link.clone(), source })
+    let link = &flexible.link;
+    share_inertia(&site.own(link)?, [&flexible.reduced.proximal, &flexible.reduced.distal]).map_err(|error| {
+        SubstitutionError::Unfit(format!("the mass of link {link:?} cannot be spread along it: {error}"))
+    })
 }
 
 /// Elastic joints and parts of a lumped link, proximal first.

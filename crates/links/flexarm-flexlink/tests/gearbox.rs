@@ -224,9 +224,12 @@ fn a_seat_yields_about_axes_that_do_not_turn_with_the_joint() {
     }
     let mut mechanism = robot();
     let weak = Gearbox { seat: Some([1e5, 0.0]), ..gearbox("elbow", GearStiffness::Axis(1e5)) };
-    assert!(matches!(insert_gearboxes(&mut mechanism, &[weak]), Err(GearboxError::NotPositive { .. })));
+    assert!(insert_gearboxes(&mut mechanism, &[weak]).unwrap_err().to_string().contains(POSITIVE));
     assert_eq!(mechanism, robot());
 }
+
+/// Words about a stiffness that is not positive definite.
+const POSITIVE: &str = "must be positive";
 
 /// Every invalid gearbox is rejected by name, and the mechanism is unchanged.
 #[test]
@@ -240,29 +243,27 @@ fn gearboxes_that_hold_nothing_or_sit_nowhere_are_refused() {
         assert_eq!(mechanism, before, "{error}");
         error
     };
+    let says = |error: GearboxError, words: &str| assert!(error.to_string().contains(words), "{error}");
     for k in [-1.0, 0.0, f64::NAN, f64::INFINITY] {
-        assert!(matches!(refuse("slew", GearStiffness::Axis(k)), GearboxError::NotPositive { .. }), "{k}");
-        assert!(
-            matches!(refuse("slew", GearStiffness::Tilting([1e5, k, 1e5])), GearboxError::NotPositive { .. }),
-            "{k}"
-        );
+        says(refuse("slew", GearStiffness::Axis(k)), POSITIVE);
+        says(refuse("slew", GearStiffness::Tilting([1e5, k, 1e5])), POSITIVE);
     }
     let mut indefinite = full();
     indefinite[(0, 3)] = 1e7;
     indefinite[(3, 0)] = 1e7;
-    assert!(matches!(refuse("slew", GearStiffness::Full(indefinite)), GearboxError::NotPositive { .. }));
+    says(refuse("slew", GearStiffness::Full(indefinite)), POSITIVE);
     let mut lopsided = full();
     lopsided[(0, 3)] += 1e4;
     assert!(refuse("slew", GearStiffness::Full(lopsided)).to_string().contains("symmetric"));
     let mut hole = full();
     hole[(2, 2)] = f64::NAN;
     refuse("slew", GearStiffness::Full(hole));
-    assert!(matches!(refuse("wrist", GearStiffness::Axis(1e5)), GearboxError::NoJoint { .. }));
-    assert!(matches!(refuse("flange", GearStiffness::Axis(1e5)), GearboxError::NoJoint { .. }));
+    says(refuse("wrist", GearStiffness::Axis(1e5)), "no such movable joint");
+    says(refuse("flange", GearStiffness::Axis(1e5)), "no such movable joint");
     let tubes = |tilts: [bool; 3]| GearStiffness::Guide(GuideTubes { outer_end: 1.0, inner_end: 0.0, tilts });
-    assert!(matches!(refuse("slew", tubes([true; 3])), GearboxError::NoGuide { .. }));
-    assert!(matches!(refuse("slide", tubes([false; 3])), GearboxError::NoGuide { .. }));
-    assert!(matches!(refuse("slide", GearStiffness::Tilting([1e5; 3])), GearboxError::Slides { .. }));
+    says(refuse("slew", tubes([true; 3])), "only a prismatic joint");
+    says(refuse("slide", tubes([false; 3])), "only a prismatic joint");
+    says(refuse("slide", GearStiffness::Tilting([1e5; 3])), "this one slides");
 }
 
 /// Truth: rotations of the distal part about the middle of the overlap of the tubes, also where the

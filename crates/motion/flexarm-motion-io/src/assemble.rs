@@ -57,7 +57,7 @@ pub(crate) fn assemble(topic: Topic, file: &str, has_clock: bool) -> Result<Asse
     let last = lines.iter().filter_map(|line| line.t.last()).fold(f64::NEG_INFINITY, |last, t| last.max(*t));
     if last <= first || lines.is_empty() {
         let found = samples.min(1);
-        return Err(PlacedProblem::from(TrajectoryError::Samples(SampleError::TooFew { found })));
+        return Err(PlacedProblem::from(TrajectoryError::Samples(SampleError::too_few(found))));
     }
     lines.iter_mut().for_each(|line| line.reach(first, last));
     tell_ends(&lines, first, last, &mut caveats);

@@ -19,27 +19,9 @@ pub(crate) enum Encoding {
     Ros1,
 }
 
-/// Reason why a message does not follow its definition, as the end of a sentence.
-#[derive(Debug, thiserror::Error)]
-pub(crate) enum DecodeError {
-    #[error("its encapsulation is {0:#04x} {1:#04x}; read are plain CDR and CDR 2 of either byte order")]
-    Encapsulation(u8, u8),
-    #[error("it has {0} bytes, fewer than the head of a message")]
-    NoHead(usize),
-    #[error("its definition is nested more than {MAX_NESTED} deep")]
-    Nested,
-    #[error("the definition of {0} is missing")]
-    NoDefinition(String),
-    #[error("it ends within `{field}`")]
-    CutOff { field: Rc<str> },
-    #[error("the length of `{field}` is given as {count}, which exceeds the size of the message")]
-    Count { field: Rc<str>, count: usize },
-    #[error("`{field}` is of the kind {kind}, which is not read")]
-    Kind { field: Rc<str>, kind: String },
-}
-
-/// Decodes the tree of a message.
-pub(crate) fn decode(message: &[u8], encoding: Encoding, definitions: &Definitions) -> Result<Node, DecodeError> {
+/// Decodes the tree of a message. Errors say why it does not follow its definition, as the end of
+/// a sentence.
+pub(crate) fn decode(message: &[u8], encoding: Encoding, definitions: &Definitions) -> Result<Node, String> {
     let mut bytes = match encoding {
         Encoding::Ros1 => Bytes { body: message, at: 0, align_to: 1, big: false, has_nul: false },
         Encoding::Cdr => {
@@ -49,8 +31,11 @@ pub(crate) fn decode(message: &[u8], encoding: Encoding, definitions: &Definitio
                 // Version 2 of CDR aligns to at most four bytes.
                 [0, 6, _, _, ..] => (true, 4),
                 [0, 7, _, _, ..] => (false, 4),
-                [first, second, _, _, ..] => return Err(DecodeError::Encapsulation(*first, *second)),
-                _ => return Err(DecodeError::NoHead(message.len())),
+                [first, second, _, _, ..] => {
+                    let read = "read are plain CDR and CDR 2 of either byte order";
+                    return Err(format!("its encapsulation is {first:#04x} {second:#04x}; {read}"));
+                }
+                _ => return Err(format!("it has {} bytes, fewer than the head of a message", message.len())),
             };
             Bytes { body: &message[4..], at: 0, align_to, big, has_nul: true }
         }
@@ -67,11 +52,11 @@ struct Bytes<'m> {
 }
 
 impl Bytes<'_> {
-    fn structure(&mut self, definitions: &Definitions, name: &str, depth: usize) -> Result<Node, DecodeError> {
+    fn structure(&mut self, definitions: &Definitions, name: &str, depth: usize) -> Result<Node, String> {
         if depth > MAX_NESTED {
-            return Err(DecodeError::Nested);
+            return Err(format!("its definition is nested more than {MAX_NESTED} deep"));
         }
-        let fields = definitions.fields(name).ok_or_else(|| DecodeError::NoDefinition(name.to_owned()))?;
+        let fields = definitions.fields(name).ok_or_else(|| format!("the definition of {name} is missing"))?;
         let mut pairs = Vec::with_capacity(fields.len());
         for field in fields {
             pairs.push((field.name.clone(), self.field(definitions, field, depth)?));
@@ -79,8 +64,8 @@ impl Bytes<'_> {
         Ok(Node::new(Value::Map(pairs), 0))
     }
 
-    fn field(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, DecodeError> {
-        let cut = || DecodeError::CutOff { field: field.name.clone() };
+    fn field(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, String> {
+        let cut = || format!("it ends within `{}`", field.name);
         let count = match field.many {
             Many::One => return self.value(definitions, field, depth),
             Many::Fixed(count) => count,
@@ -88,7 +73,8 @@ impl Bytes<'_> {
         };
         // Every value has at least one byte, except structs without fields.
         if count > self.body.len().saturating_sub(self.at) {
-            return Err(DecodeError::Count { field: field.name.clone(), count });
+            let name = &field.name;
+            return Err(format!("the length of `{name}` is given as {count}, which exceeds the size of the message"));
         }
         if matches!(field.kind, Kind::Text | Kind::Struct(_) | Kind::Time | Kind::Duration | Kind::Other(_)) {
             let items = (0..count).map(|_| self.value(definitions, field, depth)).collect::<Result<_, _>>()?;
@@ -98,12 +84,12 @@ impl Bytes<'_> {
         Ok(Node::new(Value::Numbers(numbers.ok_or_else(cut)?), 0))
     }
 
-    fn value(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, DecodeError> {
-        let cut = || DecodeError::CutOff { field: field.name.clone() };
+    fn value(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, String> {
+        let cut = || format!("it ends within `{}`", field.name);
         let value = match &field.kind {
             Kind::Struct(name) => return self.structure(definitions, name, depth + 1),
             Kind::Text => Value::Text(self.text().ok_or_else(cut)?),
-            Kind::Other(kind) => return Err(DecodeError::Kind { field: field.name.clone(), kind: kind.clone() }),
+            Kind::Other(kind) => return Err(format!("`{}` is of the kind {kind}, which is not read", field.name)),
             Kind::Time => {
                 let (sec, nanosec) = (self.u32().ok_or_else(cut)?, self.u32().ok_or_else(cut)?);
                 return Ok(time(i64::from(sec), i64::from(nanosec)));

@@ -1,9 +1,8 @@
 //! Errors of messages and bags: place, value found, value expected and remedy.
 
-use std::fmt;
 use std::path::PathBuf;
 
-use flexarm_settings::Finding;
+use flexarm_settings::{Finding, Place};
 use flexarm_trajectory::TrajectoryError;
 
 /// Content expected of a point without positions.
@@ -36,20 +35,10 @@ pub enum MotionError {
 pub(crate) enum FilePosition {
     /// The file as a whole.
     Whole,
-    /// A line of text, from 1.
-    Line(usize),
+    /// A line and a column of text, from 1.
+    Text(usize, Option<usize>),
     /// A message of a bag.
     Message { topic: String, number: usize },
-}
-
-impl fmt::Display for FilePosition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Whole => Ok(()),
-            Self::Line(line) => write!(f, ":{line}"),
-            Self::Message { topic, number } => write!(f, ", message {number} on {topic}"),
-        }
-    }
 }
 
 /// Formats names as `"a", "b"`, at most twelve.
@@ -81,7 +70,7 @@ impl PlacedProblem {
 
     /// A problem at a line of text; 0 means no line.
     pub(crate) fn at(line: u32, message: impl Into<String>) -> Self {
-        let place = if line > 0 { FilePosition::Line(line as usize) } else { FilePosition::Whole };
+        let place = if line > 0 { FilePosition::Text(line as usize, None) } else { FilePosition::Whole };
         Self { place, ..Self::new(message) }
     }
 
@@ -94,7 +83,12 @@ impl PlacedProblem {
     }
 
     pub(crate) fn of(self, origin: &str) -> MotionError {
-        let place = format!("{origin}{}", self.place);
+        let file = Place::of_file(origin);
+        let place = match self.place {
+            FilePosition::Whole => file.to_string(),
+            FilePosition::Text(line, column) => Place { column, ..file.line(line) }.to_string(),
+            FilePosition::Message { topic, number } => format!("{file}, message {number} on {topic}"),
+        };
         MotionError::Content(Box::new(Finding::error("motion", place, self.message, "")))
     }
 }

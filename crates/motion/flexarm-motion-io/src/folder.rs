@@ -10,7 +10,7 @@ use flexarm_settings::Finding;
 use crate::assemble::assemble;
 use crate::collect::Collector;
 use crate::error::{MotionError, PlacedProblem};
-use crate::unpack::{Inside, ZSTD_MAGIC, look_inside};
+use crate::unpack::{Inside, ZSTD_MAGIC, inside_of};
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, mcap, sqlite, yaml};
 
@@ -145,7 +145,7 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
             format = "SQLite bag";
             sqlite::collect_file(file, most, &mut collector)?
         } else if head.starts_with(ZSTD_MAGIC) {
-            match look_inside(file, most)? {
+            match inside_of(file, most)? {
                 Inside::Mcap(stream) => mcap::collect(stream, most, &mut collector).map_err(placed)?,
                 Inside::Database(bytes) => {
                     format = "SQLite bag";

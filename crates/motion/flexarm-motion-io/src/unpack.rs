@@ -72,7 +72,7 @@ pub(crate) enum Inside {
 }
 
 /// * `most`: maximum size of the content, bytes.
-pub(crate) fn look_inside(path: &Path, most: u64) -> Result<Inside, MotionError> {
+pub(crate) fn inside_of(path: &Path, most: u64) -> Result<Inside, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };
     let mut stream = BufReader::new(open_packed(path, most).map_err(failed)?);
     let mut head = [0; 16];

@@ -21,7 +21,7 @@ pub enum TextFormat {
 /// precision.
 ///
 /// # Errors
-/// [`TrajectoryError::BadRate`] if the rate is invalid or gives too many points.
+/// [`TrajectoryError::Value`] if the rate is invalid or gives too many points.
 pub fn write_joint_trajectory(
     trajectory: &Trajectory,
     rate_hz: f64,
@@ -30,7 +30,7 @@ pub fn write_joint_trajectory(
     let duration_s = trajectory.duration();
     let intervals = duration_s * rate_hz;
     if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_POINTS) {
-        return Err(TrajectoryError::BadRate { rate_hz, duration_s });
+        return Err(TrajectoryError::rate(rate_hz, duration_s));
     }
     let n = trajectory.joints().len();
     let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);

@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
 
-use crate::error::PlacedProblem;
+use crate::error::{FilePosition, PlacedProblem};
 use crate::value::{Node, Value};
 
 /// Maximum number of values of a text, with those behind aliases counted each time.
@@ -23,8 +23,9 @@ pub(crate) fn documents(
 }
 
 impl From<YamlError> for PlacedProblem {
-    fn from(YamlError { line, message }: YamlError) -> Self {
-        Self::at(u32::try_from(line).unwrap_or(0), format!("the text is neither YAML nor JSON: {message}"))
+    fn from(YamlError { line, column, message }: YamlError) -> Self {
+        let place = FilePosition::Text(line, Some(column));
+        Self { place, ..Self::new(format!("the text is neither YAML nor JSON: {message}")) }
     }
 }
 

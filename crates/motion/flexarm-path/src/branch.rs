@@ -40,11 +40,12 @@ impl<'m> Branches<'m> {
         self.data.X_WF(frame)
     }
 
-    /// Returns the joint values of the specified branch.
+    /// Returns the joint values of the specified branch; `X_MF`: pose of the frame in the model's
+    /// world.
     pub(crate) fn choose(
         &mut self,
         frame: &Frame,
-        X: &Pose,
+        X_MF: &Pose,
         configuration: &Configuration,
         q: &DVector<f64>,
         program_arm: &ProgramArm<'_>,
@@ -58,12 +59,12 @@ impl<'m> Branches<'m> {
             Some(arm) => {
                 let chosen = {
                     let counted = program_arm.controller_axes(*arm.joints());
-                    self.in_closed_form(&arm, &counted, X, configuration, &near)
+                    self.in_closed_form(&arm, &counted, X_MF, configuration, &near)
                 };
                 self.arms[slot].1 = Some(arm);
                 chosen
             }
-            None => self.search(frame, X, configuration, &near),
+            None => self.search(frame, X_MF, configuration, &near),
         }
     }
 

@@ -114,7 +114,8 @@ fn at(c: &Quintic, s: f64) -> [Vector3<f64>; 3] {
 }
 
 impl ToolCurve {
-    /// A straight line with uniform rotation about one axis by at most half a turn.
+    /// A straight line with uniform rotation about one axis by at most half a turn; `X0`, `X1`: poses
+    /// `X_WT` at its ends.
     pub fn line(X0: &Pose, X1: &Pose) -> Self {
         let (R0, R1) = (X0.rotation.into_inner(), X1.rotation.into_inner());
         let way = X1.translation.vector - X0.translation.vector;

@@ -157,19 +157,19 @@ impl<'m> Follower<'m> {
             follower.active.retain(|&k| Some(k) != hold);
         }
         while follower.active.len() > 6 {
-            follower.hold_one(q);
+            follower.fix_one(q);
         }
         follower
     }
 
     /// Joints that are held while the others follow, if the arm has more than six.
-    pub fn held(&self) -> Vec<usize> {
+    pub fn fixed_joints(&self) -> Vec<usize> {
         let moving = coordinates_of(self.model, &self.frame);
         moving.into_iter().filter(|k| !self.active.contains(k)).collect()
     }
 
     /// Holds the joint without which the minimum singular value is largest.
-    fn hold_one(&mut self, q: &DVector<f64>) {
+    fn fix_one(&mut self, q: &DVector<f64>) {
         forward_kinematics(self.model, &mut self.data, q);
         frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
         let without = |k: usize| {

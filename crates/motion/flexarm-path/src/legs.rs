@@ -1,15 +1,16 @@
 //! Converts the moves of a program to paths from target to target, with the joints at both ends.
 
 use flexarm_kinematics::{Data, Frame, IkOptions, inverse_kinematics_with_rule};
+use flexarm_settings::{Finding, Place};
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::arm::{PathOptions, ProgramArm};
 use crate::branch::{Branches, NoBranch};
 use crate::curve::{ToolCurve, ToolJet};
-use crate::error::PathError;
+use crate::error::{BLOCKED, at_item, at_move, no_move};
 use crate::follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet};
-use crate::program::{Blend, Item, Move, MoveKind, Target};
+use crate::program::{Blend, Item, Move, MoveKind, Program, Target};
 
 /// Joint moves shorter than this (rad or m) are ignored.
 const NO_WAY: f64 = 1e-12;
@@ -59,17 +60,19 @@ pub(crate) struct Start {
 
 impl Start {
     /// State before the first move; checks all numbers.
-    pub(crate) fn of(items: &[Item], arm: &ProgramArm<'_>) -> Result<Self, PathError> {
-        for item in items {
-            item.check().map_err(|source| PathError::out_of_range(item, source))?;
+    pub(crate) fn of(program: &Program, arm: &ProgramArm<'_>) -> Result<Self, Box<Finding>> {
+        for item in &program.items {
+            item.check().map_err(|error| at_item(item, error))?;
         }
-        let first = items.iter().find_map(|item| match item {
+        let first = program.items.iter().find_map(|item| match item {
             Item::Move(first) => Some(first),
             Item::Dwell { .. } => None,
         });
-        let first = first.ok_or(PathError::NoMove)?;
+        let first = first.ok_or_else(|| no_move(&program.name))?;
         if !arm.starts_at_rest && first.kind != MoveKind::Joint {
-            return Err(PathError::NoStart { line: first.line, statement: first.statement.clone() });
+            let why = "the program begins with a move of the tool, and where it starts is not known: begin with a \
+                       joint move, or give a start";
+            return Err(at_move(first, "no-start", why));
         }
         Ok(Self { q: arm.rest.clone(), first: 0, known: arm.starts_at_rest })
     }
@@ -109,11 +112,11 @@ impl<'m> Legs<'m> {
     }
 
     /// Names of joints that are held although they could move the tool.
-    pub(crate) fn held(&self) -> Vec<String> {
-        let mut held: Vec<usize> = self.followers.iter().flat_map(|(_, follower)| follower.held()).collect();
-        held.sort_unstable();
-        held.dedup();
-        held.into_iter().map(|k| self.arm.model.coordinates()[k].joint.clone()).collect()
+    pub(crate) fn fixed_joints(&self) -> Vec<String> {
+        let mut fixed: Vec<usize> = self.followers.iter().flat_map(|(_, follower)| follower.fixed_joints()).collect();
+        fixed.sort_unstable();
+        fixed.dedup();
+        fixed.into_iter().map(|k| self.arm.model.coordinates()[k].joint.clone()).collect()
     }
 
     /// Pose of a frame at joint values, in the model's world.
@@ -128,8 +131,8 @@ impl<'m> Legs<'m> {
         items: &[Item],
         k: &mut usize,
         start: &mut Start,
-        stops: &mut Vec<(usize, String)>,
-    ) -> Result<Vec<Leg>, PathError> {
+        stops: &mut Vec<(Place, String)>,
+    ) -> Result<Vec<Leg>, Box<Finding>> {
         let mut legs: Vec<Leg> = Vec::new();
         while let Some(Item::Move(of)) = items.get(*k) {
             let group = spline_group(items, *k);
@@ -145,15 +148,15 @@ impl<'m> Legs<'m> {
             if last.blend == Blend::Stop {
                 break;
             }
-            if let Some(Item::Dwell { line, .. }) = items.get(*k) {
-                stops.push((*line, "a dwell follows, so the tool stops".to_owned()));
+            if let Some(Item::Dwell { place, .. }) = items.get(*k) {
+                stops.push((place.clone(), "a dwell follows, so the tool stops".to_owned()));
             }
         }
         Ok(legs)
     }
 
     /// Builds the leg of one move; `None` if the arm is already at the target.
-    pub(crate) fn leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, PathError> {
+    pub(crate) fn leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, Box<Finding>> {
         if of.kind == MoveKind::Joint {
             return self.joint_leg(of, start);
         }
@@ -163,7 +166,7 @@ impl<'m> Legs<'m> {
         self.tool_leg(of, frame, curve, start)
     }
 
-    fn tool_curve(&mut self, of: &Move, X0: &Pose) -> Result<ToolCurve, PathError> {
+    fn tool_curve(&mut self, of: &Move, X0: &Pose) -> Result<ToolCurve, Box<Finding>> {
         let X_MB = self.arm.X_MW * of.X_WB;
         let X1 = match &of.to {
             Target::Pose { X_BT, .. } => X_MB * X_BT,
@@ -180,7 +183,7 @@ impl<'m> Legs<'m> {
         let via = (X_MB * nalgebra::Point3::from(*via)).coords;
         let via_rotation = via_rotation.map(|R| X_MB.rotation * R);
         ToolCurve::arc(X0, &via, via_rotation.as_ref(), &X1, *angle, *turns_with_path)
-            .map_err(|source| PathError::Arc { line: of.line, statement: of.statement.clone(), source })
+            .map_err(|error| at_move(of, "arc", error))
     }
 
     /// Follows a curve once to find the joints at its end.
@@ -190,7 +193,7 @@ impl<'m> Legs<'m> {
         frame: Frame,
         curve: ToolCurve,
         start: &mut Start,
-    ) -> Result<Option<Leg>, PathError> {
+    ) -> Result<Option<Leg>, Box<Finding>> {
         let length = curve.length();
         if length <= 1e-9 {
             return Ok(None);
@@ -206,28 +209,24 @@ impl<'m> Legs<'m> {
     }
 
     /// Inserts values of the controller's axes into the vector of all coordinates.
-    fn with_axes(&self, of: &Move, values: &[f64], q: &DVector<f64>) -> Result<DVector<f64>, PathError> {
+    fn with_axes(&self, of: &Move, values: &[f64], q: &DVector<f64>) -> Result<DVector<f64>, Box<Finding>> {
         let (found, axes) = (values.len(), self.arm.axes.len());
         if found > axes {
-            return Err(PathError::Axes { line: of.line, statement: of.statement.clone(), found, axes });
+            return Err(at_move(of, "axes", format!("{found} axis values for an arm of {axes} axes")));
         }
         let mut q = q.clone();
         self.arm.set_axes(values, &mut q);
         Ok(q)
     }
 
-    fn joint_leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, PathError> {
+    fn joint_leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, Box<Finding>> {
         let frame = self.tool_frame(of);
         let q1 = match &of.to {
             Target::Joints(values) => self.with_axes(of, values, &start.q)?,
             Target::Pose { X_BT, configuration } => {
                 let X = self.arm.X_MW * of.X_WB * X_BT;
                 let choice = self.branches.choose(&frame, &X, configuration, &start.q, &self.arm);
-                choice.map_err(|NoBranch(why)| PathError::Unreachable {
-                    line: of.line,
-                    statement: of.statement.clone(),
-                    why,
-                })?
+                choice.map_err(|NoBranch(why)| unreachable(of, &why))?
             }
         };
         let q0 = std::mem::replace(&mut start.q, q1.clone());
@@ -272,7 +271,7 @@ impl<'m> Legs<'m> {
         q1: &DVector<f64>,
     ) -> Option<(Vec<GuidedJoint>, DVector<f64>)> {
         let rule = self.options.rule.clone()?;
-        let left_over = self.follower(&way.frame, q0).held();
+        let left_over = self.follower(&way.frame, q0).fixed_joints();
         let length = way.curve.length();
         if left_over.is_empty() {
             return None;
@@ -313,14 +312,13 @@ impl<'m> Legs<'m> {
     }
 
     /// Legs of a spline through the targets of consecutive moves.
-    pub(crate) fn spline(&mut self, group: &[&Move], start: &mut Start) -> Result<Vec<Leg>, PathError> {
+    pub(crate) fn spline(&mut self, group: &[&Move], start: &mut Start) -> Result<Vec<Leg>, Box<Finding>> {
         let frame = self.tool_frame(group[0]);
         let mut poses = vec![self.pose(&frame, &start.q)];
         let mut owners: Vec<&Move> = Vec::new();
         for of in group {
             let Target::Pose { X_BT, .. } = &of.to else {
-                let why = "a spline goes through poses, not through joint values".to_owned();
-                return Err(PathError::Unreachable { line: of.line, statement: of.statement.clone(), why });
+                return Err(unreachable(of, "a spline goes through poses, not through joint values"));
             };
             let X = self.arm.X_MW * of.X_WB * X_BT;
             let last = &poses[poses.len() - 1];
@@ -402,8 +400,13 @@ fn natural_second_derivatives(p: &[Vector3<f64>], h: &[f64]) -> Vec<Vector3<f64>
     second
 }
 
+/// Error about a target that no joint values reach.
+fn unreachable(of: &Move, why: &str) -> Box<Finding> {
+    at_move(of, "unreachable", format!("no joint values bring the tool there: {why}"))
+}
+
 /// Error for a path that cannot be followed, with the reason as a sentence.
-pub(crate) fn blocked_error(of: &Move, curve: &ToolCurve, blocked: Blocked) -> PathError {
+pub(crate) fn blocked_error(of: &Move, curve: &ToolCurve, blocked: Blocked) -> Box<Finding> {
     let part = 100.0 * blocked.s / curve.length();
     let p = curve.at(blocked.s).X.translation.vector;
     let place = format!("{part:.1} % of the way, at ({:.4}, {:.4}, {:.4}) m", p.x, p.y, p.z);
@@ -415,5 +418,5 @@ pub(crate) fn blocked_error(of: &Move, curve: &ToolCurve, blocked: Blocked) -> P
             blocked.joint, blocked.sigma
         )
     };
-    PathError::Blocked { line: of.line, statement: of.statement.clone(), blocked, why }
+    at_move(of, BLOCKED, why)
 }

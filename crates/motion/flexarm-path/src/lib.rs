@@ -8,6 +8,7 @@
 //! use flexarm_kinematics::{Joint, JointKind, Link, Mechanism, Model, Pose};
 //! use flexarm_path::program::{Blend, Item, Move, MoveKind, Program, Speed, Target};
 //! use flexarm_path::{JointBounds, PathOptions, ProgramArm, plan};
+//! use flexarm_settings::Place;
 //! use nalgebra::{DVector, Vector3};
 //!
 //! // A slide that carries a tool.
@@ -30,7 +31,7 @@
 //! // From 0 to 0.8 m: v/a + L/v, and the rise time of the acceleration.
 //! let to = |x: f64| {
 //!     Item::Move(Move {
-//!         line: 1,
+//!         place: Place::of_file("slide").line(1),
 //!         statement: "move".into(),
 //!         kind: MoveKind::Joint,
 //!         to: Target::Joints(vec![x]),
@@ -72,7 +73,7 @@ pub use flexarm_trajectory::{jerk_law, time_law};
 
 pub use arm::{ControllerAxis, JointBounds, PathOptions, ProgramArm};
 pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
-pub use error::PathError;
+pub use error::BLOCKED;
 pub use follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet, coordinates_of};
 pub use plan::plan;
 pub use planned::{Planned, PlannedMove, Slowed, SlowedBy};

@@ -1,10 +1,11 @@
 //! Public interface of the planner: converts a program to joint motions over time.
 
 use flexarm_kinematics::Model;
+use flexarm_settings::Finding;
 use flexarm_trajectory::{Trajectory, TrajectoryError};
 
 use crate::arm::{PathOptions, ProgramArm};
-use crate::error::PathError;
+use crate::error::{BLOCKED, at_item, no_move};
 use crate::follow::coordinates_of;
 use crate::legs::{Legs, Start};
 use crate::planned::Planned;
@@ -19,8 +20,8 @@ const STILL: f64 = 1e-12;
 /// Plans the motion of a program.
 ///
 /// # Errors
-/// [`PathError`] for targets out of reach, paths through singular poses, contradictory statements.
-pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Planned, PathError> {
+/// A [`Finding`] at the statement, for targets out of reach, paths through singular poses, contradictory statements.
+pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Planned, Box<Finding>> {
     let moving = coordinates_of(arm.model, &arm.flange);
     if moving.len() != 7 {
         return plan_holding(program, arm, options, None);
@@ -28,7 +29,7 @@ pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> R
     // Of seven joints one is held while the tool follows its path: the best one at the start, or
     // the first one with which the path can be run.
     let first = plan_holding(program, arm, options, None);
-    if !matches!(first, Err(PathError::Blocked { .. })) {
+    if !first.as_ref().is_err_and(|error| error.code == BLOCKED) {
         return first;
     }
     let others = moving.into_iter().map(|held| plan_holding(program, arm, options, Some(held)));
@@ -42,14 +43,14 @@ fn plan_holding(
     arm: &ProgramArm<'_>,
     options: &PathOptions,
     held: Option<usize>,
-) -> Result<Planned, PathError> {
+) -> Result<Planned, Box<Finding>> {
     let mut legs = Legs::new(arm, options, held);
     let mut knots: Vec<Knot> = Vec::new();
     // A dwell before the first target is known takes place at that target.
     let mut waiting = 0.0;
     let (mut moves, mut stops, mut now) = (Vec::new(), Vec::new(), 0.0);
     let items = &program.items;
-    let mut start = Start::of(items, arm)?;
+    let mut start = Start::of(program, arm)?;
     let mut k = start.first;
     while k < items.len() {
         if let Item::Dwell { seconds, .. } = &items[k] {
@@ -76,10 +77,10 @@ fn plan_holding(
             now += schedule.duration();
         }
     }
-    let last = items.last().filter(|_| !knots.is_empty()).ok_or(PathError::NoMove)?;
-    check_end(now).map_err(|source| PathError::out_of_range(last, source))?;
-    let held = legs.held();
-    Ok(Planned { trajectory: trajectory(arm.model, knots)?, moves, stops, held })
+    let last = items.last().filter(|_| !knots.is_empty()).ok_or_else(|| no_move(&program.name))?;
+    check_end(now).map_err(|error| at_item(last, error))?;
+    let fixed = legs.fixed_joints();
+    Ok(Planned { trajectory: trajectory(arm.model, knots)?, moves, stops, fixed })
 }
 
 /// Builds curves from the knots of all routes and dwells.

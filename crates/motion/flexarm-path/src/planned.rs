@@ -1,12 +1,13 @@
 //! Results of planning: the motion and its moves.
 
+use flexarm_settings::Place;
 use flexarm_trajectory::Trajectory;
 
 /// Result of one move.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlannedMove {
     /// Line in the program.
-    pub line: usize,
+    pub place: Place,
     /// Statement.
     pub statement: String,
     /// Start and end time (s); with a blend, the time at its middle.
@@ -59,8 +60,8 @@ pub struct Planned {
     pub trajectory: Trajectory,
     /// Results by move.
     pub moves: Vec<PlannedMove>,
-    /// Corners at which the tool stops although a blend was requested: line and reason.
-    pub stops: Vec<(usize, String)>,
+    /// Corners at which the tool stops although a blend was requested: place and reason.
+    pub stops: Vec<(Place, String)>,
     /// Joints held although they could move the tool (redundant arms).
-    pub held: Vec<String>,
+    pub fixed: Vec<String>,
 }

@@ -9,6 +9,7 @@
 //! Frames: W world of the controller (base of its robot, ROS's `base`), B base or work object of a
 //! move, F flange of the controller (ROS's `tool0`), T tool.
 
+use flexarm_settings::{Finding, Place};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -20,16 +21,7 @@ pub struct Program {
     /// Moves and dwells in order; loops are unrolled.
     pub items: Vec<Item>,
     /// Notes for the user: assumed defaults, statements without effect on the motion.
-    pub notes: Vec<Note>,
-}
-
-/// A note of the parser.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Note {
-    /// Line in the file, counted from 1; `None` for the file as a whole.
-    pub line: Option<usize>,
-    /// Text, one sentence.
-    pub text: String,
+    pub notes: Vec<Finding>,
 }
 
 /// A move or a dwell.
@@ -41,7 +33,7 @@ pub enum Item {
     /// The tool does not move.
     Dwell {
         /// Line in the file.
-        line: usize,
+        place: Place,
         /// Duration (s).
         seconds: f64,
     },
@@ -50,8 +42,8 @@ pub enum Item {
 /// One move, from the end of the previous one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Move {
-    /// Line in the file, counted from 1.
-    pub line: usize,
+    /// Line in the file.
+    pub place: Place,
     /// Statement as written in the file, trimmed, for messages and reports.
     pub statement: String,
     /// Kind of path.

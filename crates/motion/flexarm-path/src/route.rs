@@ -1,11 +1,11 @@
 //! Routes from one stop to the next: legs joined by blends, with the joints at points along them.
 
+use flexarm_settings::{Finding, Place};
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3};
 
 use crate::arm::PathOptions;
 use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
-use crate::error::PathError;
 use crate::follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet, between};
 use crate::legs::{Leg, LegPath, Legs, blocked_error};
 use crate::program::{Blend, Speed};
@@ -93,15 +93,15 @@ impl Route {
     pub(crate) fn all(
         owner: &mut Legs<'_>,
         legs: Vec<Leg>,
-        stops: &mut Vec<(usize, String)>,
-    ) -> Result<Vec<Self>, PathError> {
+        stops: &mut Vec<(Place, String)>,
+    ) -> Result<Vec<Self>, Box<Finding>> {
         let (mut routes, mut here) = (Vec::new(), Vec::new());
         for leg in legs {
             if let Some(last) = here.last()
                 && let Corner::Stop(why) = corner(last, &leg, owner.arm.has_jerk_limits())
             {
                 if last.of.blend != Blend::Pass || why == CURVATURE {
-                    stops.push((last.of.line, why.to_owned()));
+                    stops.push((last.of.place.clone(), why.to_owned()));
                 }
                 routes.push(Self::new(owner, std::mem::take(&mut here))?);
             }
@@ -113,7 +113,7 @@ impl Route {
         Ok(routes)
     }
 
-    fn new(owner: &mut Legs<'_>, legs: Vec<Leg>) -> Result<Self, PathError> {
+    fn new(owner: &mut Legs<'_>, legs: Vec<Leg>) -> Result<Self, Box<Finding>> {
         let n = legs.len();
         // Length of each leg that its two blends take.
         let mut taken = vec![[0.0, 0.0]; n];
@@ -144,7 +144,7 @@ impl Route {
     }
 
     /// Appends stations along a stretch.
-    fn add(&mut self, owner: &mut Legs<'_>, stretch: Stretch) -> Result<(), PathError> {
+    fn add(&mut self, owner: &mut Legs<'_>, stretch: Stretch) -> Result<(), Box<Finding>> {
         let options = owner.options.clone();
         let (points, tool, sigma) = match &stretch.way {
             LegPath::Tool(way) => {
@@ -294,7 +294,7 @@ fn first_beyond(length: f64, distance: f64, mut away: impl FnMut(f64) -> f64) ->
 }
 
 /// Trimmed legs with the blends between them.
-fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<Vec<Stretch>, PathError> {
+fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<Vec<Stretch>, Box<Finding>> {
     let mut stretches = Vec::new();
     for (k, leg) in legs.iter().enumerate() {
         let range = [taken[k][0], leg.length - taken[k][1]];
@@ -340,7 +340,7 @@ fn guided_between(a: (&FrameCurve, f64), b: (&FrameCurve, f64), corner: &DVector
 }
 
 /// Joints on a leg at a parameter, by continuation from its end or its start.
-fn joints_at(owner: &mut Legs<'_>, leg: &Leg, s: f64, from_end: bool) -> Result<JointJet, PathError> {
+fn joints_at(owner: &mut Legs<'_>, leg: &Leg, s: f64, from_end: bool) -> Result<JointJet, Box<Finding>> {
     match &leg.way {
         LegPath::Tool(way) => {
             let (origin, q) = if from_end { (leg.length, &leg.q1) } else { (0.0, &leg.q0) };

@@ -1,12 +1,13 @@
 //! A route over time: its time law, the knots of the joint curves, and the results of its moves.
 
 use flexarm_kinematics::Model;
+use flexarm_settings::Finding;
 use flexarm_trajectory::{JointKnots, JointPeak, LONGEST, Trajectory, TrajectoryError};
 use nalgebra::DVector;
 
 use crate::arm::{JointBounds, PathOptions, ProgramArm};
 use crate::averaged::{SLACK, kept};
-use crate::error::PathError;
+use crate::error::at_move;
 use crate::follow::{JointJet, between};
 use crate::jerk_bounded::JerkBounded;
 use crate::limits::{Cap, LimitedPath, Limits};
@@ -112,11 +113,8 @@ pub(crate) struct Schedule<'r> {
 }
 
 impl<'r> Schedule<'r> {
-    pub(crate) fn new(route: &'r Route, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Self, PathError> {
-        let fail = |why: String| {
-            let of = &route.legs[0].of;
-            PathError::Law { line: of.line, statement: of.statement.clone(), why }
-        };
+    pub(crate) fn new(route: &'r Route, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Self, Box<Finding>> {
+        let fail = |why: String| at_move(&route.legs[0].of, "time-law", why);
         if !(SHORTEST_RISE..=LONGEST).contains(&options.rise_s) {
             return Err(fail(format!(
                 "accelerations rise in {} s: give a time of {SHORTEST_RISE} s or more",
@@ -149,7 +147,7 @@ impl<'r> Schedule<'r> {
     }
 
     /// Factor by which the motion must be slower for the durations that the program gives.
-    fn given_duration(&self, fail: &dyn Fn(String) -> PathError) -> Result<f64, PathError> {
+    fn given_duration(&self, fail: &dyn Fn(String) -> Box<Finding>) -> Result<f64, Box<Finding>> {
         let given: Vec<f64> = self.route.legs.iter().filter_map(|leg| leg.of.speed.duration_s).collect();
         if given.is_empty() {
             return Ok(1.0);
@@ -378,7 +376,7 @@ impl<'r> Schedule<'r> {
             }
         }
         PlannedMove {
-            line: of.line,
+            place: of.place.clone(),
             statement: of.statement.clone(),
             span_s: span.map(|t| now + t),
             top_m_s: top,

@@ -1,11 +1,11 @@
 //! Conversion between program targets and joint values.
 
 use flexarm_kinematics::{AnalyticArm, Data, Frame, forward_kinematics, kuka_turn};
+use flexarm_settings::Finding;
 use flexarm_spatial::Pose;
 use nalgebra::DVector;
 
 use crate::arm::{PathOptions, ProgramArm};
-use crate::error::PathError;
 use crate::legs::{Legs, Start, spline_group};
 use crate::program::{Configuration, Item, Move, MoveKind, Program, Target};
 
@@ -18,10 +18,10 @@ pub fn target_joints(
     program: &Program,
     arm: &ProgramArm<'_>,
     options: &PathOptions,
-) -> Result<Vec<Option<DVector<f64>>>, PathError> {
+) -> Result<Vec<Option<DVector<f64>>>, Box<Finding>> {
     let items = &program.items;
     let mut legs = Legs::new(arm, options, None);
-    let mut start = Start::of(items, arm)?;
+    let mut start = Start::of(program, arm)?;
     let mut found = vec![None; items.len()];
     let mut k = 0;
     while k < items.len() {

@@ -7,8 +7,9 @@ use flexarm_kinematics::{
 };
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
 use flexarm_path::{
-    ControllerAxis, JointBounds, PathError, PathOptions, Planned, ProgramArm, SlowedBy, plan, target_at, target_joints,
+    BLOCKED, ControllerAxis, JointBounds, PathOptions, Planned, ProgramArm, SlowedBy, plan, target_at, target_joints,
 };
+use flexarm_settings::Place;
 use flexarm_spatial::{Pose, rotation_vector};
 use flexarm_testkit::reference_arm;
 use flexarm_trajectory::JointLimits;
@@ -67,7 +68,16 @@ struct Sampled {
 
 fn to(kind: MoveKind, to: Target, speed: Speed, blend: Blend) -> Item {
     let statement = format!("{kind:?}").split_whitespace().next().unwrap().to_owned();
-    Item::Move(Move { line: 1, statement, kind, to, X_WB: Pose::identity(), X_FT: None, speed, blend })
+    Item::Move(Move {
+        place: Place::of_file("test.toml").line(1),
+        statement,
+        kind,
+        to,
+        X_WB: Pose::identity(),
+        X_FT: None,
+        speed,
+        blend,
+    })
 }
 
 fn joints(q: &[f64]) -> Item {
@@ -293,7 +303,7 @@ fn joint_moves_lines_and_splines_blend_into_each_other_with_continuous_accelerat
         spline([0.05, 0.2, 0.05], Blend::Pass),
         spline([0.0, 0.25, 0.1], Blend::Pass),
         spline([-0.05, 0.2, 0.0], Blend::Stop),
-        Item::Dwell { line: 9, seconds: 0.3 },
+        Item::Dwell { place: Place::of_file("test.toml").line(9), seconds: 0.3 },
         to(
             MoveKind::Joint,
             Target::Joints(other.to_vec()),
@@ -374,16 +384,18 @@ fn a_program_that_begins_with_a_line_or_leaves_the_reach_is_refused_with_its_lin
     let X = cell.pose(&START);
     let line = |d: [f64; 3]| to(MoveKind::Line, pose(shifted(&X, d)), feed(0.2), Blend::Stop);
     let run = |items| plan(&program(items), &cell.arm(), &PathOptions::default()).unwrap_err();
-    assert!(matches!(run(vec![line([0.0, 0.1, 0.0])]), PathError::NoStart { line: 1, .. }));
-    let far = run(vec![joints(&START), line([0.0, 0.0, 9.0])]);
-    assert!(matches!(far, PathError::Blocked { .. }));
-    assert!(matches!(run(vec![joints(&[0.0; 7])]), PathError::Axes { found: 7, axes: 6, .. }));
-    assert!(matches!(run(vec![]), PathError::NoMove));
     let bad = Speed { linear_m_s: Some(0.0), ..Speed::default() };
-    assert!(matches!(
-        run(vec![joints(&START), to(MoveKind::Line, pose(X), bad, Blend::Stop)]),
-        PathError::Value { .. }
-    ));
+    for (items, place, code, words) in [
+        (vec![line([0.0, 0.1, 0.0])], "test.toml:1", "no-start", "where it starts is not known"),
+        (vec![joints(&START), line([0.0, 0.0, 9.0])], "test.toml:1", BLOCKED, "out of reach"),
+        (vec![joints(&[0.0; 7])], "test.toml:1", "axes", "7 axis values for an arm of 6 axes"),
+        (vec![], "test", "no-move", "has no move"),
+        (vec![joints(&START), to(MoveKind::Line, pose(X), bad, Blend::Stop)], "test.toml:1", "value", "the speed"),
+    ] {
+        let error = run(items);
+        assert_eq!((&*error.location, &*error.code), (place, code), "{error}");
+        assert!(error.message.contains(words), "{error}");
+    }
 }
 
 #[test]
@@ -398,14 +410,14 @@ fn numbers_beyond_any_motion_are_refused_before_work_begins() {
         joints(&[f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0]),
         to(MoveKind::Line, pose(shifted(&X, [0.0, 1e300, 0.0])), feed(0.2), Blend::Stop),
         to(arc, pose(shifted(&X, [0.0, 0.2, 0.0])), feed(0.2), Blend::Stop),
-        Item::Dwell { line: 1, seconds: 1e300 },
+        Item::Dwell { place: Place::of_file("test.toml").line(1), seconds: 1e300 },
     ] {
         let error = run(item);
-        assert!(matches!(error, PathError::Value { line: 1, .. }), "{error}");
+        assert_eq!((&*error.location, &*error.code), ("test.toml:1", "value"), "{error}");
     }
     // A speed at which the motion exceeds the maximum duration.
     let slow = to(MoveKind::Line, pose(shifted(&X, [0.0, 0.1, 0.0])), feed(1e-12), Blend::Stop);
-    assert!(matches!(run(slow), PathError::Trajectory(_) | PathError::Law { .. } | PathError::Value { .. }));
+    assert!(["trajectory", "time-law", "value"].contains(&&*run(slow).code));
 }
 
 #[test]
@@ -413,7 +425,7 @@ fn a_dwell_before_the_first_target_is_one_at_that_target() {
     let cell = Cell::new();
     let target = shifted(&cell.pose(&START), [0.0, 0.1, 0.0]);
     let items = vec![
-        Item::Dwell { line: 1, seconds: 0.7 },
+        Item::Dwell { place: Place::of_file("test.toml").line(1), seconds: 0.7 },
         joints(&START),
         to(MoveKind::Line, pose(target), feed(0.2), Blend::Stop),
     ];
@@ -484,7 +496,7 @@ fn a_redundant_arm_follows_its_line_with_one_joint_at_rest() {
     let X1 = shifted(&X0, [0.05, -0.1, 0.05]);
     let items = vec![joints(&REDUNDANT), to(MoveKind::Line, pose(X1), feed(0.1), Blend::Stop)];
     let planned = plan(&program(items), &seven_joint_arm(&model), &PathOptions::default()).unwrap();
-    assert_eq!(planned.held.len(), 1);
+    assert_eq!(planned.fixed.len(), 1);
     let way = [X0.translation.vector, X1.translation.vector];
     let off = joints_over_time(&planned, 1500)
         .iter()
@@ -692,7 +704,7 @@ fn joints_at_targets_are_those_that_the_targets_were_made_of_and_make_them_again
         to(MoveKind::Joint, Target::Joints(axes(&places[0])), free, Blend::Stop),
         to(MoveKind::Line, pose(cell.pose(&places[1])), feed(0.1), Blend::Distance(0.002)),
         spline(2, Blend::Pass),
-        Item::Dwell { line: 1, seconds: 0.1 },
+        Item::Dwell { place: Place::of_file("test.toml").line(1), seconds: 0.1 },
         spline(3, Blend::Pass),
         // The arm is already there.
         spline(3, Blend::Pass),

@@ -21,7 +21,7 @@ fn via_mm(step: &Move) -> Vector3<f64> {
 fn words_make_rapids_lines_and_arcs_with_feed_in_mm_per_minute() {
     let program = read("plate.ngc", &ReadOptions::default());
     let moves = moves(&program);
-    assert_eq!((program.name.as_str(), moves[0].line, &moves[0].kind), ("plate", 6, &MoveKind::Joint));
+    assert_eq!((program.name.as_str(), moves[0].place.line, &moves[0].kind), ("plate", Some(6), &MoveKind::Joint));
     assert_pose(&pose(moves[0]), &at_mm(0.0, 0.0, 10.0, euler_product(0.0, 0.0, 180.0))); // the tool points down
     assert_eq!(moves[0].blend, Blend::Stop);
     assert_eq!((moves[1].speed.linear_m_s, moves[2].speed.linear_m_s), (Some(0.005), Some(0.02)));
@@ -40,7 +40,7 @@ fn words_make_rapids_lines_and_arcs_with_feed_in_mm_per_minute() {
 fn whole_circles_and_helices_are_arcs_that_stay_on_them() {
     let program = read("plate.ngc", &ReadOptions::default());
     let all = moves(&program);
-    let on_line = |line: usize| all.iter().filter(|step| step.line == line).copied().collect::<Vec<_>>();
+    let on_line = |line: usize| all.iter().filter(|step| step.place.line == Some(line)).copied().collect::<Vec<_>>();
     // A full circle of radius 5 about (5, 50), clockwise: two halves, the upper one first.
     let circle = on_line(15);
     assert_eq!(circle.len(), 2);
@@ -85,9 +85,10 @@ fn whole_circles_and_helices_are_arcs_that_stay_on_them() {
 fn planes_radii_units_and_times_follow_the_standard() {
     let program = read("plate.ngc", &ReadOptions::default());
     let all = moves(&program);
-    let at = |line: usize| *all.iter().find(|step| step.line == line).unwrap();
+    let at = |line: usize| *all.iter().find(|step| step.place.line == Some(line)).unwrap();
     assert_eq!(place_mm(at(18)).map(|x| (x * 1e9).round() / 1e9), [15.0, 42.5, -3.0]); // X[#1 * 2] Y[50 - #1]
-    assert!(program.items.contains(&Item::Dwell { line: 19, seconds: 0.5 }));
+    let dwells = |item: &Item| matches!(item, Item::Dwell { place, seconds: 0.5 } if place.line == Some(19));
+    assert!(program.items.iter().any(dwells));
     assert_relative_eq!(place_mm(at(20))[0], 25.4, max_relative = 1e-12); // G20 X1
     assert_relative_eq!(at(20).speed.linear_m_s.unwrap(), 10.0 * 0.0254 / 60.0, max_relative = 1e-15);
     assert_eq!(at(22).speed.duration_s, Some(30.0)); // G93 F2: half a minute
@@ -161,7 +162,7 @@ fn from_joint_values_at_the_start_rapids_at_a_speed_are_lines_from_where_the_too
 #[test]
 fn what_is_assumed_is_told() {
     let program = read_text("n.nc", "G1 F100\nG0 Z5\nG1 X10\n", &ReadOptions::default()).unwrap();
-    let notes: Vec<&str> = program.notes.iter().map(|note| note.text.as_str()).collect();
+    let notes: Vec<&str> = program.notes.iter().map(|note| note.message.as_str()).collect();
     for expected in [
         "neither G20 nor G21 is there: lengths are in mm",
         "neither G61 nor G64 is there",

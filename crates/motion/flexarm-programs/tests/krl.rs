@@ -16,7 +16,7 @@ fn inline_forms_of_a_pendant_take_speed_frames_and_blends_from_the_data_list() {
     assert_eq!(moves.len(), 3);
 
     let (home, ptp, lin) = (moves[0], moves[1], moves[2]);
-    assert_eq!((home.line, home.statement.as_str()), (16, "PTP XHOME"));
+    assert_eq!((home.place.line, home.statement.as_str()), (Some(16), "PTP XHOME"));
     for (found, expected) in joints_deg(home).iter().zip([10.0, -90.0, 90.0, 0.0, 45.0, 0.0]) {
         assert_relative_eq!(*found, expected, epsilon = 1e-12);
     }
@@ -37,9 +37,9 @@ fn inline_forms_of_a_pendant_take_speed_frames_and_blends_from_the_data_list() {
     assert_relative_eq!(lin.speed.linear_m_s2.unwrap(), 0.5 * 2.3, max_relative = 1e-15);
     // WAIT SEC after the output makes the move stop despite C_DIS.
     assert_eq!(lin.blend, Blend::Stop);
-    assert_eq!(program.items[3], Item::Dwell { line: 31, seconds: 0.5 });
-    let outputs = program.notes.iter().find(|note| note.text.starts_with("inputs and outputs")).unwrap();
-    assert_eq!(outputs.line, Some(30));
+    assert!(matches!(&program.items[3], Item::Dwell { place, seconds: 0.5 } if place.line == Some(31)));
+    let outputs = program.notes.iter().find(|note| note.message.starts_with("inputs and outputs")).unwrap();
+    assert!(outputs.location.ends_with(":30"), "{outputs}");
 }
 
 #[test]

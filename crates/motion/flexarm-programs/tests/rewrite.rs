@@ -101,8 +101,8 @@ fn literals_of_krl_and_of_its_data_list_are_replaced_in_their_lines() {
     let new = read("square.src", &text, &[("square.dat", &data_text)]);
     meets(&old, &new, &rewritten);
     assert_eq!(
-        moves(&old).iter().map(|m| m.line).collect::<Vec<_>>(),
-        moves(&new).iter().map(|m| m.line).collect::<Vec<_>>()
+        moves(&old).iter().map(|m| m.place.line).collect::<Vec<_>>(),
+        moves(&new).iter().map(|m| m.place.line).collect::<Vec<_>>()
     );
     // Unchanged coordinates are now written, because earlier ones changed; branches that were not
     // given are still omitted.

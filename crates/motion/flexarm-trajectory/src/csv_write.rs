@@ -16,12 +16,12 @@ impl Trajectory {
     /// returns the same values.
     ///
     /// # Errors
-    /// [`TrajectoryError::BadRate`] or [`TrajectoryError::Write`].
+    /// [`TrajectoryError::Value`] or [`TrajectoryError::Write`].
     pub fn to_csv(&self, rate_hz: f64, mut out: impl Write) -> Result<(), TrajectoryError> {
         let duration_s = self.duration();
         let intervals = duration_s * rate_hz;
         if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_ROWS) {
-            return Err(TrajectoryError::BadRate { rate_hz, duration_s });
+            return Err(TrajectoryError::rate(rate_hz, duration_s));
         }
         writeln!(out, "# unit: rad")?;
         writeln!(out, "# time: s")?;

@@ -30,13 +30,13 @@ impl Curve {
         let mut pieces = self.pieces.clone();
         if start > 0.0 {
             knots.insert(0, 0.0);
-            pieces.insert(0, Piece::hold(start, self.start()[0]));
+            pieces.insert(0, Piece::constant(start, self.start()[0]));
         }
         let end = knots[knots.len() - 1];
         // Ends that differ only by rounding are the same.
         if duration - end > 1e-9 * duration {
             knots.push(duration);
-            pieces.push(Piece::hold(duration - end, self.end()[0]));
+            pieces.push(Piece::constant(duration - end, self.end()[0]));
         } else if let (Some(last), Some(piece)) = (knots.last_mut(), pieces.last())
             && (duration - *last).abs() <= 1e-9 * piece.width
         {
@@ -67,13 +67,13 @@ impl Curve {
 
     /// Jumps at every knot, including those to the holds before and after.
     pub(crate) fn jumps(&self) -> impl Iterator<Item = Jump> + '_ {
-        let held = |[q, ..]: [f64; 4]| [q, 0.0, 0.0, 0.0];
+        let at_rest = |[q, ..]: [f64; 4]| [q, 0.0, 0.0, 0.0];
         let last = self.pieces.len();
         (0..=last).map(move |i| {
             let left = i.checked_sub(1).map(|i| &self.pieces[i]);
             let right = self.pieces.get(i);
-            let before = left.map_or_else(|| held(self.start()), |piece| piece.at(piece.width));
-            let after = right.map_or_else(|| held(self.end()), |piece| piece.at(0.0));
+            let before = left.map_or_else(|| at_rest(self.start()), |piece| piece.at(piece.width));
+            let after = right.map_or_else(|| at_rest(self.end()), |piece| piece.at(0.0));
             // Positions are exact to a few units in the last place; each derivative divides this
             // error by the width.
             let width = left.into_iter().chain(right).map(|piece| piece.width).fold(f64::INFINITY, f64::min);

@@ -69,29 +69,9 @@ pub enum TrajectoryError {
         /// Start of the polynomial piece concerned, s.
         time_s: f64,
     },
-    /// Time scale that is not positive and finite.
-    #[error("time scale {factor} is not a positive number; 2 makes the motion take twice the time")]
-    BadFactor {
-        /// Value given.
-        factor: f64,
-    },
-    /// Blend time at corners that is not positive and finite.
-    #[error("corners cannot be rounded within {seconds} s; give a positive time, such as 0.02 s")]
-    BadRounding {
-        /// Value given, s.
-        seconds: f64,
-    },
-    /// Sampling rate that is not positive and finite, or that would give more than 100 million
-    /// rows.
-    #[error(
-        "sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that makes at most 100 million rows"
-    )]
-    BadRate {
-        /// Value given, Hz.
-        rate_hz: f64,
-        /// Duration of the trajectory, s.
-        duration_s: f64,
-    },
+    /// A time scale, blend time or sampling rate is out of its range.
+    #[error("{0}")]
+    Value(String),
     /// Motion that does not consist of quintic moves from rest to rest.
     #[error(
         "the motion is not made of quintic moves from rest to rest: as waypoints, joint {joint:?} would be off by {difference:.2e} \
@@ -112,6 +92,26 @@ pub enum TrajectoryError {
         #[from]
         source: io::Error,
     },
+}
+
+impl From<TrajectoryError> for Box<Finding> {
+    fn from(error: TrajectoryError) -> Self {
+        match error {
+            TrajectoryError::File(finding) => finding,
+            other => Self::new(Finding::error("trajectory", "", other.to_string(), "")),
+        }
+    }
+}
+
+impl TrajectoryError {
+    /// Sampling rate that is not positive and finite, or that would give more than 100 million
+    /// rows.
+    pub fn rate(rate_hz: f64, duration_s: f64) -> Self {
+        Self::Value(format!(
+            "sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that makes \
+             at most 100 million rows"
+        ))
+    }
 }
 
 fn mismatch(missing: &[String], unknown: &[String]) -> String {

@@ -124,10 +124,14 @@ impl Leg<'_> {
     fn curves_through_points(&self) -> Result<(Vec<Curve>, f64), PlanError> {
         let Self { number, planned, .. } = *self;
         if planned.profile != Profile::Quintic {
-            return Err(PlanError::ViaNeedsQuintic { number });
+            let message = format!(
+                "move {number} passes points on the way, which only the quintic and the optimal law can; set `profile = \
+                 \"quintic\"` in this move or drop `via`"
+            );
+            return Err(PlanError::Invalid { number: Some(number), message });
         }
         let (points, weights, moving) = self.points();
-        let u = via::passing_times(&points, &weights).map_err(|via| PlanError::RepeatedPoint { number, via })?;
+        let u = via::passing_times(&points, &weights).map_err(|via| PlanError::repeated_point(number, via))?;
         let unit_curve = |i: usize| {
             let q: Vec<f64> = points.iter().map(|point| point[i]).collect();
             Curve { knots: u.clone(), pieces: via::rest_to_rest_spline(&u, &q) }
@@ -176,7 +180,7 @@ impl Leg<'_> {
         self.require("velocity", &moving, |limits| limits.velocity)?;
         self.require("acceleration", &moving, |limits| limits.acceleration)?;
         let path = JointPath::new(&points, &weights, &planned.limits);
-        let curves = path.map_err(|via| PlanError::RepeatedPoint { number, via })?.fastest();
+        let curves = path.map_err(|via| PlanError::repeated_point(number, via))?.fastest();
         let least = curves.iter().filter_map(|curve| curve.knots.last()).fold(0.0, |end: f64, t| end.max(*t));
         let duration = planned.duration.unwrap_or(least);
         Ok((curves.iter().map(|curve| curve.stretched(duration / least)).collect(), duration))
@@ -220,7 +224,7 @@ impl Curve {
         let last = self.knots.len() - 1;
         // A remainder from rounding of the times is not a hold.
         if until - self.knots[last] > 1e-14 * until {
-            self.pieces.push(Piece::hold(until - self.knots[last], q));
+            self.pieces.push(Piece::constant(until - self.knots[last], q));
             self.knots.push(until);
         } else {
             self.knots[last] = until;

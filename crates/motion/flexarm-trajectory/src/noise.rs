@@ -108,19 +108,19 @@ pub(crate) fn without_rounding(t: &[f64], q: &[f64], found: &Noise) -> Option<Ve
 /// fixed ends.
 pub(crate) fn smoothed(t: &[f64], q: &[f64], cutoff_hz: f64) -> Vec<f64> {
     let (n, mut smooth) = (q.len(), q.to_vec());
-    let hold_end = |from: usize| from + q[from..].iter().take_while(|x| **x == q[from]).count() - 1;
+    let end_of_hold = |from: usize| from + q[from..].iter().take_while(|x| **x == q[from]).count() - 1;
     let is_hold = |from: usize, to: usize| to + 1 - from >= HOLD.0 && t[to] - t[from] >= HOLD.1;
     let mut first = 0;
     let mut after_hold = false;
     while first + 1 < n {
-        let held = hold_end(first);
-        if is_hold(first, held) {
-            (first, after_hold) = (held, true);
+        let end = end_of_hold(first);
+        if is_hold(first, end) {
+            (first, after_hold) = (end, true);
             continue;
         }
-        let mut last = held;
-        while last + 1 < n && !is_hold(last, hold_end(last)) {
-            last = hold_end(last).max(last + 1);
+        let mut last = end;
+        while last + 1 < n && !is_hold(last, end_of_hold(last)) {
+            last = end_of_hold(last).max(last + 1);
         }
         let ends = [after_hold, last + 1 < n];
         smooth[first..=last].copy_from_slice(&smoothing_spline(&t[first..=last], &q[first..=last], ends, cutoff_hz));

@@ -19,6 +19,9 @@ use crate::leg::Leg;
 use crate::problem::PlanError;
 use crate::trajectory::Trajectory;
 
+/// Message about a plan that lasts no time.
+const STILL: &str = "nothing moves and nothing is held, so the trajectory lasts 0 s; add a move or a hold";
+
 /// Velocity profile of a move.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Profile {
@@ -117,7 +120,7 @@ impl Plan {
             from = &planned.to;
         }
         if now <= 0.0 {
-            return Err(PlanError::NothingHappens.into());
+            return Err(PlanError::of_move(0, STILL).into());
         }
         Trajectory::from_curves(self.joints.clone(), curves, now, notes)
     }
@@ -127,20 +130,23 @@ impl Plan {
         let n = self.joints.len();
         let length = |what: &'static str, number: usize, found: usize| match found == n {
             true => Ok(()),
-            false => Err(PlanError::Length { what, number, found, expected: n }),
+            false => {
+                let what = format!("`{what}` has {found} entries; expected {n}, one per joint");
+                Err(PlanError::of_move(number, what))
+            }
         };
         let finite = |what: &'static str, number: usize, values: &[f64]| match values.iter().find(|q| !q.is_finite()) {
             None => Ok(()),
-            Some(&value) => Err(PlanError::BadNumber { what, number, value, allowed: "a finite number" }),
+            Some(value) => Err(bad_number(what, number, *value, "a finite number")),
         };
         let within = |what: &'static str, number: usize, value: f64, is_good: bool, allowed: &'static str| match is_good
         {
             true => Ok(()),
-            false => Err(PlanError::BadNumber { what, number, value, allowed }),
+            false => Err(bad_number(what, number, value, allowed)),
         };
 
         if n == 0 {
-            return Err(PlanError::NoJoint);
+            return Err(PlanError::of_move(0, "the plan has no joints; name at least one"));
         }
         length("start", 0, self.start.len())?;
         finite("start", 0, &self.start)?;
@@ -168,4 +174,8 @@ impl Plan {
         }
         Ok(())
     }
+}
+
+fn bad_number(what: &str, number: usize, value: f64, allowed: &str) -> PlanError {
+    PlanError::of_move(number, format!("`{what}` is {value}; expected {allowed}"))
 }

@@ -26,7 +26,7 @@ pub struct Piece {
 
 impl Piece {
     /// A piece that stays at `q`.
-    pub(crate) fn hold(width: f64, q: f64) -> Self {
+    pub(crate) fn constant(width: f64, q: f64) -> Self {
         Self { width, c: [q, 0.0, 0.0, 0.0, 0.0, 0.0] }
     }
 

@@ -4,7 +4,7 @@
 
 use std::fmt::Display;
 
-use flexarm_settings::Finding;
+use flexarm_settings::{Finding, Place};
 
 use crate::curve::LONGEST;
 use crate::error::TrajectoryError;
@@ -68,8 +68,8 @@ impl Problem {
 
     /// The error of a file, at a line and a column if they are known.
     pub(crate) fn at(self, origin: &str, line: Option<usize>, column: Option<usize>) -> TrajectoryError {
-        let numbers: String = line.into_iter().chain(column).map(|number| format!(":{number}")).collect();
-        TrajectoryError::File(Box::new(Finding::error(self.code, format!("{origin}{numbers}"), self.message, "")))
+        let place = Place { line, column, ..Place::of_file(origin) };
+        TrajectoryError::File(Box::new(Finding::error(self.code, place.to_string(), self.message, "")))
     }
 }
 
@@ -93,21 +93,6 @@ pub const MISSING_LIMIT: &str = "missing-limit";
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SampleError {
-    /// Too few rows.
-    #[error("{found} rows of samples; expected at least 2, a start and an end")]
-    TooFew {
-        /// Number of rows.
-        found: usize,
-    },
-    /// No joint.
-    #[error("no joint columns; expected at least one joint beside the time")]
-    NoJoint,
-    /// A joint name appears twice.
-    #[error("joint {joint:?} appears twice; rename or remove one of them")]
-    RepeatedJoint {
-        /// Joint name.
-        joint: String,
-    },
     /// Times that do not increase.
     #[error(
         "time {this} s does not follow {previous} s; times must increase from row to row: sort the rows and remove repeated ones"
@@ -120,25 +105,13 @@ pub enum SampleError {
         /// Time of the row, s.
         this: f64,
     },
-    /// NaN or infinite value.
-    #[error("{what} is {value}; expected a finite number: remove or repair the row")]
-    NotFinite {
-        /// Column name.
-        what: String,
-        /// Index of the row, from 0.
-        row: usize,
-        /// The value.
-        value: f64,
-    },
-    /// Column whose length differs from that of the times.
-    #[error("{what} has {found} values; expected {expected}, one for each time")]
-    Length {
-        /// Column name.
-        what: String,
-        /// Values found.
-        found: usize,
-        /// Number of times.
-        expected: usize,
+    /// Accelerations without velocities.
+    #[error(
+        "joint {joint:?} has accelerations but no velocities; add the column \"{joint}.vel\" or drop \"{joint}.acc\""
+    )]
+    AccelerationWithoutVelocity {
+        /// Joint name.
+        joint: String,
     },
     /// Cut-off of a smoothing that the samples do not resolve.
     #[error(
@@ -150,50 +123,34 @@ pub enum SampleError {
         /// Half the sampling rate (Hz).
         most_hz: f64,
     },
-    /// Accelerations without velocities.
-    #[error(
-        "joint {joint:?} has accelerations but no velocities; add the column \"{joint}.vel\" or drop \"{joint}.acc\""
-    )]
-    AccelerationWithoutVelocity {
-        /// Joint name.
-        joint: String,
-    },
+    /// Joints, rows or values are missing, repeated or not finite.
+    #[error("{0}")]
+    Invalid(String),
 }
 
-/// A problem with a plan. Moves are counted from 1; 0 is the start.
+impl SampleError {
+    /// Fewer than two rows.
+    pub fn too_few(found: usize) -> Self {
+        Self::Invalid(format!("{found} rows of samples; expected at least 2, a start and an end"))
+    }
+
+    pub(crate) fn no_joint() -> Self {
+        Self::Invalid("no joint columns; expected at least one joint beside the time".into())
+    }
+
+    pub(crate) fn repeated_joint(joint: &str) -> Self {
+        Self::Invalid(format!("joint {joint:?} appears twice; rename or remove one of them"))
+    }
+
+    pub(crate) fn not_finite(what: &str, value: f64) -> Self {
+        Self::Invalid(format!("{what} is {value}; expected a finite number: remove or repair the row"))
+    }
+}
+
+/// A problem with a plan. Moves are counted from 1.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PlanError {
-    /// No joint.
-    #[error("the plan has no joints; name at least one")]
-    NoJoint,
-    /// The plan lasts 0 s.
-    #[error("nothing moves and nothing is held, so the trajectory lasts 0 s; add a move or a hold")]
-    NothingHappens,
-    /// List that does not have one entry per joint.
-    #[error("{}`{what}` has {found} entries; expected {expected}, one per joint", of_move(*number))]
-    Length {
-        /// The list.
-        what: &'static str,
-        /// Number of the move.
-        number: usize,
-        /// Number of entries found.
-        found: usize,
-        /// Number of joints.
-        expected: usize,
-    },
-    /// Number outside its range.
-    #[error("{}`{what}` is {value}; expected {allowed}", of_move(*number))]
-    BadNumber {
-        /// The quantity.
-        what: &'static str,
-        /// Number of the move.
-        number: usize,
-        /// Value given.
-        value: f64,
-        /// Accepted values.
-        allowed: &'static str,
-    },
     /// A limit that the profile needs is missing.
     #[error(
         "move {number} has no duration, and the {quantity} limit of joint {joint:?} is not known; \
@@ -207,36 +164,41 @@ pub enum PlanError {
         /// `"velocity"`, `"acceleration"` or `"jerk"`.
         quantity: &'static str,
     },
-    /// Via points with a profile other than quintic or optimal.
-    #[error(
-        "move {number} passes points on the way, which only the quintic and the optimal law can; set `profile = \"quintic\"` in this \
-         move or drop `via`"
-    )]
-    ViaNeedsQuintic {
+    /// A move, the start or the plan as a whole is invalid.
+    #[error("{message}")]
+    Invalid {
         /// Number of the move.
-        number: usize,
-    },
-    /// Via point that coincides with the previous point.
-    #[error(
-        "move {number}: point {via} on the way (the goal counts as the last) lies where the one before it is; remove it, or make two moves with a hold"
-    )]
-    RepeatedPoint {
-        /// Number of the move.
-        number: usize,
-        /// Number of the point within the move, from 1; the goal is the last.
-        via: usize,
+        number: Option<usize>,
+        /// What was found, what is expected, and the remedy.
+        message: String,
     },
 }
 
 impl PlanError {
+    /// Error about a move; 0 is the start, and the plan as a whole.
+    pub(crate) fn of_move(number: usize, what: impl Display) -> Self {
+        match number {
+            0 => Self::Invalid { number: None, message: what.to_string() },
+            number => Self::Invalid { number: Some(number), message: format!("move {number}: {what}") },
+        }
+    }
+
+    /// Points on the way that coincide; the goal counts as the last.
+    pub(crate) fn repeated_point(number: usize, via: usize) -> Self {
+        Self::of_move(
+            number,
+            format!(
+                "point {via} on the way (the goal counts as the last) lies where the one before it is; remove it, or \
+                 make two moves with a hold"
+            ),
+        )
+    }
+
     /// Number of the move concerned, from 1.
     pub fn move_number(&self) -> Option<usize> {
         match *self {
-            Self::NoJoint | Self::NothingHappens => None,
-            Self::Length { number, .. } | Self::BadNumber { number, .. } => Some(number).filter(|&n| n > 0),
-            Self::MissingLimit { number, .. }
-            | Self::ViaNeedsQuintic { number }
-            | Self::RepeatedPoint { number, .. } => Some(number),
+            Self::Invalid { number, .. } => number,
+            Self::MissingLimit { number, .. } => Some(number),
         }
     }
 }
@@ -247,8 +209,4 @@ pub(crate) fn list(names: &[String]) -> String {
         true => "none".to_owned(),
         false => names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", "),
     }
-}
-
-fn of_move(number: usize) -> String {
-    if number == 0 { String::new() } else { format!("move {number}: ") }
 }

@@ -16,11 +16,12 @@ impl Trajectory {
     /// starts or ends at speed still does.
     ///
     /// # Errors
-    /// [`TrajectoryError::BadRounding`] unless `seconds` is positive and finite;
+    /// [`TrajectoryError::Value`] unless `seconds` is positive and finite;
     /// [`TrajectoryError::OutOfRange`] if it is so short that numbers are too extreme for f64.
     pub fn with_rounded_corners(&self, seconds: f64) -> Result<Self, TrajectoryError> {
         if !(seconds > 0.0 && seconds.is_finite()) {
-            return Err(TrajectoryError::BadRounding { seconds });
+            let mend = "give a positive time, such as 0.02 s";
+            return Err(TrajectoryError::Value(format!("corners cannot be rounded within {seconds} s; {mend}")));
         }
         let curves = self.curves().iter().map(|curve| curve.rounded(seconds)).collect();
         Self::from_curves(self.joints().to_vec(), curves, self.duration(), self.notes().to_vec())

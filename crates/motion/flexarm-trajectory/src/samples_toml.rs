@@ -103,12 +103,12 @@ impl Trajectory {
     /// precision.
     ///
     /// # Errors
-    /// [`TrajectoryError::BadRate`].
+    /// [`TrajectoryError::Value`].
     pub fn to_samples_toml(&self, rate_hz: f64) -> Result<String, TrajectoryError> {
         let duration_s = self.duration();
         let intervals = duration_s * rate_hz;
         if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_ROWS) {
-            return Err(TrajectoryError::BadRate { rate_hz, duration_s });
+            return Err(TrajectoryError::rate(rate_hz, duration_s));
         }
         let n = self.joints().len();
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);

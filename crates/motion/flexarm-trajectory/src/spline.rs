@@ -117,13 +117,13 @@ impl Samples {
     fn check(&self) -> Result<(), SampleError> {
         let n = self.times.len();
         if n < 2 {
-            return Err(SampleError::TooFew { found: n });
+            return Err(SampleError::too_few(n));
         }
         if self.joints.is_empty() {
-            return Err(SampleError::NoJoint);
+            return Err(SampleError::no_joint());
         }
-        if let Some(row) = self.times.iter().position(|t| !t.is_finite()) {
-            return Err(SampleError::NotFinite { what: "time".to_owned(), row, value: self.times[row] });
+        if let Some(time) = self.times.iter().find(|t| !t.is_finite()) {
+            return Err(SampleError::not_finite("time", *time));
         }
         // The first time is subtracted below; two close times far from zero may then coincide.
         let elapsed = |row: usize| self.times[row] - self.times[0];
@@ -132,7 +132,7 @@ impl Samples {
         }
         for (i, joint) in self.joints.iter().enumerate() {
             if self.joints[..i].iter().any(|other| other.name == joint.name) {
-                return Err(SampleError::RepeatedJoint { joint: joint.name.clone() });
+                return Err(SampleError::repeated_joint(&joint.name));
             }
             joint.check(n)?;
         }
@@ -222,10 +222,12 @@ impl JointSamples {
             let Some(column) = column else { continue };
             let what = format!("{}{suffix}", self.name);
             if column.len() != n {
-                return Err(SampleError::Length { what, found: column.len(), expected: n });
+                let found = column.len();
+                let message = format!("{what} has {found} values; expected {n}, one for each time");
+                return Err(SampleError::Invalid(message));
             }
-            if let Some(row) = column.iter().position(|value| !value.is_finite()) {
-                return Err(SampleError::NotFinite { what, row, value: column[row] });
+            if let Some(value) = column.iter().find(|value| !value.is_finite()) {
+                return Err(SampleError::not_finite(&what, *value));
             }
         }
         Ok(())

@@ -152,12 +152,12 @@ impl Trajectory {
             qdot.len(),
             qddot.len()
         );
-        let held = t < 0.0 || t > self.duration;
+        let outside = t < 0.0 || t > self.duration;
         for (i, curve) in self.curves.iter().enumerate() {
             let [position, velocity, acceleration, _] = curve.at(t);
             q[i] = position;
-            qdot[i] = if held { 0.0 } else { velocity };
-            qddot[i] = if held { 0.0 } else { acceleration };
+            qdot[i] = if outside { 0.0 } else { velocity };
+            qddot[i] = if outside { 0.0 } else { acceleration };
         }
     }
 
@@ -218,7 +218,7 @@ impl Trajectory {
         for (joint, value) in held {
             assert!(!joints.iter().any(|j| j == joint), "joint {joint:?} moves already");
             joints.push((*joint).to_owned());
-            let pieces = vec![Piece::hold(self.duration, *value)];
+            let pieces = vec![Piece::constant(self.duration, *value)];
             curves.push(Curve { knots: vec![0.0, self.duration], pieces });
         }
         Self::from_curves(joints, curves, self.duration, self.notes.clone())
@@ -240,7 +240,7 @@ impl Trajectory {
         for (start, part) in parts {
             for (joint, curve) in part.joints.iter().zip(&part.curves) {
                 if joints.contains(joint) {
-                    return Err(SampleError::RepeatedJoint { joint: joint.clone() }.into());
+                    return Err(SampleError::repeated_joint(joint).into());
                 }
                 if !(*start >= 0.0 && start.is_finite()) {
                     return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: *start });
@@ -253,7 +253,7 @@ impl Trajectory {
             }
         }
         if joints.is_empty() {
-            return Err(SampleError::NoJoint.into());
+            return Err(SampleError::no_joint().into());
         }
         Self::from_curves(joints, curves, duration, notes)
     }
@@ -261,11 +261,12 @@ impl Trajectory {
     /// Returns the same path with the time multiplied by `factor`: 2 halves every velocity.
     ///
     /// # Errors
-    /// [`TrajectoryError::BadFactor`] unless `factor` is positive and finite;
+    /// [`TrajectoryError::Value`] unless `factor` is positive and finite;
     /// [`TrajectoryError::OutOfRange`] if it is too extreme for f64.
     pub fn scaled(&self, factor: f64) -> Result<Self, TrajectoryError> {
         if !(factor > 0.0 && factor.is_finite()) {
-            return Err(TrajectoryError::BadFactor { factor });
+            let example = "2 makes the motion take twice the time";
+            return Err(TrajectoryError::Value(format!("time scale {factor} is not a positive number; {example}")));
         }
         let stretch = |curve: &Curve| Curve {
             knots: curve.knots.iter().map(|knot| knot * factor).collect(),

@@ -252,10 +252,10 @@ impl Rig {
     }
 
     /// Like [`Rig::statics`], but observes the frame of another rig of the same arm.
-    pub fn statics_at(&self, wrench: &Vector6<f64>, seen: &Self) -> Result<Vector6<f64>, Error> {
+    pub fn statics_at(&self, wrench: &Vector6<f64>, observed: &Self) -> Result<Vector6<f64>, Error> {
         let plant = self.loaded(wrench)?;
         let e = static_equilibrium(&plant, 0.0).map_err(step_error)?;
-        Ok(Vector6::from(tcp_error(&seen.X_WF, &place(&plant, &seen.frame, &e))))
+        Ok(Vector6::from(tcp_error(&observed.X_WF, &place(&plant, &observed.frame, &e))))
     }
 
     /// Like [`Rig::statics`], but steps in time from the undeformed arm until it is at rest.
@@ -264,15 +264,15 @@ impl Rig {
         const BETWEEN: usize = 50;
         let plant = self.loaded(wrench)?;
         let mut stepper = new_stepper(kind, plant.clone(), h, Start::Undeformed).map_err(step_error)?;
-        let mut seen = Observation::new(&plant);
+        let mut observed = Observation::new(&plant);
         let (mut before, mut calm) = (Vector6::repeat(f64::INFINITY), 0);
         for step in 1..=AT_MOST {
             stepper.step().map_err(step_error)?;
             if step % BETWEEN != 0 {
                 continue;
             }
-            stepper.observe(&mut seen);
-            let X = seen.X_WB[self.frame.body] * self.frame.X_BF;
+            stepper.observe(&mut observed);
+            let X = observed.X_WB[self.frame.body] * self.frame.X_BF;
             let now = Vector6::from(tcp_error(&self.X_WF, &X));
             // At rest: the pose changes only by rounding.
             calm = if (now - before).amax() < 1e-15 + 1e-12 * now.amax() { calm + 1 } else { 0 };
@@ -291,14 +291,14 @@ impl Rig {
     /// * `h`: step size (s); `every` is a multiple of it.
     pub fn path(&self, kind: StepperKind, h: f64, every: f64, duration: f64) -> Result<Vec<Vector3<f64>>, Error> {
         let mut stepper = new_stepper(kind, self.plant.clone(), h, Start::Undeformed).map_err(step_error)?;
-        let mut seen = Observation::new(&self.plant);
+        let mut observed = Observation::new(&self.plant);
         let (stride, steps) = ((every / h).round() as usize, (duration / h).round() as usize);
         let mut path = vec![Vector3::zeros()];
         for step in 1..=steps {
             stepper.step().map_err(step_error)?;
             if step % stride == 0 {
-                stepper.observe(&mut seen);
-                let X = seen.X_WB[self.frame.body] * self.frame.X_BF;
+                stepper.observe(&mut observed);
+                let X = observed.X_WB[self.frame.body] * self.frame.X_BF;
                 path.push(X.translation.vector - self.X_WF.translation.vector);
             }
         }
@@ -348,12 +348,12 @@ pub fn tool_path(
     let plant = robot.model(modelling)?.plant(motion).map_err(step_error)?;
     let frame = plant.model.frame(TCP_FRAME).ok_or_else(|| Error::Case("the robot has no tool".into()))?.clone();
     let mut stepper = new_stepper(ALPHA, plant.clone(), h, start).map_err(step_error)?;
-    let mut seen = Observation::new(&plant);
+    let mut observed = Observation::new(&plant);
     let mut path = Vec::new();
     for _ in 0..steps {
         stepper.step().map_err(step_error)?;
-        stepper.observe(&mut seen);
-        path.push((seen.X_WB[frame.body] * frame.X_BF).translation.vector);
+        stepper.observe(&mut observed);
+        path.push((observed.X_WB[frame.body] * frame.X_BF).translation.vector);
     }
     Ok(path)
 }

@@ -85,8 +85,8 @@ fn residuals(robot: &Robot, found: &Identification, path: &Path) -> Result<Vec<V
         let q: Vec<f64> = row[..6].iter().map(|deg| deg.to_radians()).collect();
         let unsolved = |source| flexarm::Error::Step { source, partial: false };
         point.solve(&q, &Wrench::zeros()).map_err(unsolved)?;
-        let seen = X_WI.inverse() * (point.tcp_pose() * nalgebra::Point3::from(reflector));
-        all.push(seen.coords - 1e-3 * Vector3::new(row[6], row[7], row[8]));
+        let measured = X_WI.inverse() * (point.tcp_pose() * nalgebra::Point3::from(reflector));
+        all.push(measured.coords - 1e-3 * Vector3::new(row[6], row[7], row[8]));
     }
     Ok(all)
 }
@@ -149,8 +149,9 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
     }
     if let Some(last) = all.last() {
         let of = |joint: usize| format!("drive.joint_{joint}.gearbox.stiffness");
-        let told = |joint: &usize| last.found.parameters.iter().any(|p| p.name == of(*joint) && p.identifiable);
-        let count = (4..=6).filter(told).count() as f64;
+        let is_identifiable =
+            |joint: &usize| last.found.parameters.iter().any(|p| p.name == of(*joint) && p.identifiable);
+        let count = (4..=6).filter(is_identifiable).count() as f64;
         case.claim("determined stiffnesses of joints 4 to 6, which carry little", "statics", count, Bound::AtMost(0.0));
     }
     let torques: Vec<String> = weight_torques.iter().map(|torque| format!("{torque:.1}")).collect();

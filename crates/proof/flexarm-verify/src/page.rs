@@ -61,13 +61,13 @@ pub enum Cell {
         value: f64,
         /// Print format.
         #[serde(skip)]
-        look: Look,
+        format: NumberFormat,
     },
 }
 
 /// Print format of a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
+pub enum NumberFormat {
     /// With this number of decimals.
     Decimals(usize),
     /// With this number of significant digits.
@@ -122,7 +122,7 @@ pub enum Bound {
 }
 
 impl Bound {
-    fn holds(self, x: f64) -> bool {
+    fn is_met(self, x: f64) -> bool {
         match self {
             Self::AtMost(bound) => x <= bound,
             Self::AtLeast(bound) => x >= bound,
@@ -186,7 +186,7 @@ impl Case {
     }
 
     fn add_claim(&mut self, text: String, truth: String, measured: f64, bound: Bound, stored: bool) {
-        let holds = bound.holds(measured);
+        let holds = bound.is_met(measured);
         self.blocks.push(Block::Claim(Claim { text, truth, measured, bound, stored, holds }));
     }
 
@@ -231,22 +231,22 @@ pub fn word(text: impl Into<String>) -> Cell {
 
 /// A number with the given number of decimals.
 pub fn fixed(value: f64, decimals: usize) -> Cell {
-    Cell::Number { value, look: Look::Decimals(decimals) }
+    Cell::Number { value, format: NumberFormat::Decimals(decimals) }
 }
 
 /// A number with the given number of significant digits.
 pub fn digits(value: f64, digits: usize) -> Cell {
-    Cell::Number { value, look: Look::Digits(digits) }
+    Cell::Number { value, format: NumberFormat::Digits(digits) }
 }
 
 /// A relative error.
 pub fn error(value: f64) -> Cell {
-    Cell::Number { value: value.abs(), look: Look::Error }
+    Cell::Number { value: value.abs(), format: NumberFormat::Error }
 }
 
 /// A relative difference with its sign.
 pub fn signed(value: f64) -> Cell {
-    Cell::Number { value, look: Look::Signed }
+    Cell::Number { value, format: NumberFormat::Signed }
 }
 
 impl Cell {
@@ -255,15 +255,15 @@ impl Cell {
         match self {
             Self::Text(text) => text.clone(),
             Self::Number { value, .. } if !value.is_finite() => "-".into(),
-            Self::Number { value, look: Look::Decimals(n) } => {
+            Self::Number { value, format: NumberFormat::Decimals(n) } => {
                 let text = format!("{value:.n$}");
                 // Print zero without a sign.
                 let is_zero = text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.');
                 if is_zero { text.trim_start_matches('-').into() } else { text }
             }
-            Self::Number { value, look: Look::Digits(n) } => significant(*value, *n),
-            Self::Number { value, look: Look::Error } => bare_error(*value),
-            Self::Number { value, look: Look::Signed } => {
+            Self::Number { value, format: NumberFormat::Digits(n) } => significant(*value, *n),
+            Self::Number { value, format: NumberFormat::Error } => bare_error(*value),
+            Self::Number { value, format: NumberFormat::Signed } => {
                 let size = bare_error(value.abs());
                 let sign = if *value < 0.0 { "-" } else { "+" };
                 if value.abs() < FLOOR { size } else { format!("{sign}{size}") }

@@ -47,8 +47,8 @@ impl ContributionPeaks {
         Self { peaks: vec![ContributionPeak { peak_m: 0.0, t_peak_s: 0.0, peak_rad: 0.0 }; elements] }
     }
 
-    /// Adds a sample of one element at time `t` (s); returns the TCP displacement that it causes,
-    /// as [`tcp_displacement`] does.
+    /// Adds a sample of one element at time `t` (s); returns the TCP displacement that it causes, in
+    /// world axes. `map` and `deflection` as in [`tcp_displacement`].
     ///
     /// # Panics
     /// If there is no such element.

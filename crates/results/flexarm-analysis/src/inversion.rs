@@ -158,7 +158,7 @@ impl Inversion {
         let mut series = Vec::with_capacity(nodes.len());
         for (k, node) in nodes.iter().enumerate() {
             let found = Series::of(node, k as f64 * spacing_s)?;
-            cutoff_hz = cutoff_hz.min(found.holds_up_to(node, cutoff_hz));
+            cutoff_hz = cutoff_hz.min(found.accurate_up_to_hz(node, cutoff_hz));
             series.push(found);
         }
         let servos = nodes.iter().filter_map(|node| node.servo.clone()).collect();
@@ -314,7 +314,7 @@ impl Series {
 
     /// Returns the highest frequency below `most` up to which one application leaves less than
     /// [`LEFT`] (Hz).
-    fn holds_up_to(&self, node: &Node, most: f64) -> f64 {
+    fn accurate_up_to_hz(&self, node: &Node, most: f64) -> f64 {
         let (lowest, highest, factor) = SEARCH;
         let mut hz = lowest;
         while hz <= highest.min(most) {

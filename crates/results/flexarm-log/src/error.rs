@@ -3,7 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
-use flexarm_settings::Setting;
+use flexarm_settings::{Place, Setting};
 
 /// An error of starting, continuing, closing or reading a recording.
 #[derive(Debug, thiserror::Error)]
@@ -66,10 +66,12 @@ pub enum LogError {
     },
 
     /// The file to be read is not a recording, or not one that can be read.
-    #[error("{}: found {found}; expected {expected}{}", path.display(), if mend.is_empty() { String::new() } else { format!(": {mend}") })]
+    #[error("{}: found {found}; expected {expected}{}", Place { line: *line, ..Place::of_file(path.display()) }, if mend.is_empty() { String::new() } else { format!(": {mend}") })]
     NotARecording {
         /// The file.
         path: PathBuf,
+        /// Line of a text file, from 1.
+        line: Option<usize>,
         /// Contents found.
         found: String,
         /// Contents expected.

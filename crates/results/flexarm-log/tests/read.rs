@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
 use flexarm_log::{
-    CreateOptions, Holds, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample, open_recording,
+    ContentLevel, CreateOptions, LogError, Recorder, RecordingFormat, RunHeader, RunResult, RunSource, Sample,
+    open_recording,
 };
 
 /// Number of samples of most tests, enough for more than one chunk of MCAP.
@@ -18,7 +19,7 @@ fn recorder(path: &Path, format: RecordingFormat) -> Box<dyn Recorder> {
 
 /// Formats of this build whose numbers are read back exactly.
 fn exact_formats() -> Vec<RecordingFormat> {
-    let exact = |format: &RecordingFormat| format.is_built_in() && format.info().holds != Holds::Pictures;
+    let exact = |format: &RecordingFormat| format.is_built_in() && format.info().content != ContentLevel::Pictures;
     RecordingFormat::ALL.into_iter().filter(exact).collect()
 }
 

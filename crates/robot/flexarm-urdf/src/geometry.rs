@@ -8,7 +8,9 @@ use std::path::PathBuf;
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Vector3};
 
-use crate::mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_mesh_with};
+use flexarm_settings::Finding;
+
+use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_mesh_with};
 
 /// A shape on a link.
 #[derive(Clone, Debug, PartialEq)]
@@ -76,11 +78,14 @@ impl Geometry {
     /// properties use [`Geometry::mass_properties`].
     ///
     /// # Errors
-    /// [`MeshError`], for meshes only.
-    pub fn triangles(&self) -> Result<TriangleMesh, MeshError> {
+    /// Finding about the file of a mesh.
+    pub fn triangles(&self) -> Result<TriangleMesh, Box<Finding>> {
         Ok(match self {
             Self::Mesh { path: Some(path), scale, up_axis, .. } => load_mesh_with(path, *up_axis)?.scaled(scale),
-            Self::Mesh { uri, path: None, .. } => return Err(MeshError::NotFound { uri: uri.clone() }),
+            Self::Mesh { uri, path: None, .. } => {
+                let message = format!("no file was found for {uri:?}");
+                return Err(Box::new(Finding::error("mesh", "", message, "")));
+            }
             Self::Box { size } => box_triangles(size),
             Self::Cylinder { radius, length } => cylinder_triangles(*radius, *length),
             Self::Capsule { radius, length } => round_triangles(*radius, *length),
@@ -92,8 +97,8 @@ impl Geometry {
     /// exact integrals for meshes.
     ///
     /// # Errors
-    /// [`MeshError`], for meshes only.
-    pub fn mass_properties(&self) -> Result<MassProperties, MeshError> {
+    /// Finding about the file of a mesh.
+    pub fn mass_properties(&self) -> Result<MassProperties, Box<Finding>> {
         let (volume, second_moments) = match self {
             Self::Mesh { .. } => return Ok(self.triangles()?.mass_properties()),
             Self::Box { size: s } => (s.x * s.y * s.z, s.component_mul(s) / 12.0),

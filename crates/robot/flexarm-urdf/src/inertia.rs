@@ -18,7 +18,7 @@ use crate::mesh::MassProperties;
 use crate::raw::{RawInertial, RawLink, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
 use crate::report::{Report, quoted};
-use crate::shapes::{LinkShape, NoEstimate};
+use crate::shapes::LinkShape;
 use crate::tree::Body;
 
 /// Relative tolerance of the checks, that of single-precision files.
@@ -206,7 +206,7 @@ fn check_body<'r>(
     body: &Body,
     inertias: &[Option<LinkInertia>],
     without_extent: &[bool],
-    failures: &[Option<NoEstimate>],
+    failures: &[Option<String>],
     options: &ReadOptions,
     report: &mut Report,
 ) -> Option<(&'r str, Finding)> {
@@ -304,7 +304,7 @@ fn fill_from_shapes(
     estimate: InertiaEstimate,
     inertias: &mut [Option<LinkInertia>],
     report: &mut Report,
-) -> Vec<Option<NoEstimate>> {
+) -> Vec<Option<String>> {
     let mut failures = vec![None; robot.links.len()];
     let (what, value) = match estimate {
         InertiaEstimate::Density(density) => ("the density", density),
@@ -334,7 +334,7 @@ fn fill_from_shapes(
     }
     if filled.is_empty() {
         let has_no_shape = |i: &usize| shapes[*i].solids.as_ref().is_ok_and(Vec::is_empty);
-        empty.into_iter().filter(has_no_shape).for_each(|i| failures[i] = Some(NoEstimate::NoShape));
+        empty.into_iter().filter(has_no_shape).for_each(|i| failures[i] = Some("there is no shape".to_owned()));
     }
     // For rods the "volume" is the length.
     let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
@@ -377,13 +377,13 @@ fn check_density(first: &RawLink, volume: f64, density: f64, report: &mut Report
 
 /// Returns the inertia of the shapes of a link at unit density; `None` without shapes: such a frame
 /// may remain massless if other links have shapes.
-fn of_shapes(link: &RawLink, shape: &LinkShape, report: &mut Report) -> Result<Option<SpatialInertia>, NoEstimate> {
-    let solids = shape.solids.as_ref().map_err(NoEstimate::clone)?;
+fn of_shapes(link: &RawLink, shape: &LinkShape, report: &mut Report) -> Result<Option<SpatialInertia>, String> {
+    let solids = shape.solids.as_ref().map_err(String::clone)?;
     if solids.is_empty() {
         return Ok(None);
     }
     let M_L = of_solids(link, solids, report);
-    if M_L.mass > 0.0 { Ok(Some(M_L)) } else { Err(NoEstimate::NoVolume) }
+    if M_L.mass > 0.0 { Ok(Some(M_L)) } else { Err("its mesh encloses no volume".to_owned()) }
 }
 
 /// Returns the inertia of the solids of a link at unit density; warns if a mesh is not closed.

@@ -7,9 +7,9 @@ use nalgebra::{Rotation3, Translation3, Unit, Vector3};
 use urdf_rs::JointType;
 
 use crate::lint::RATES;
-use crate::place::TextPosition;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::{Report, did_you_mean, quoted};
+use flexarm_settings::Place;
 use flexarm_settings::closest;
 
 /// Tolerance of the axis length; axes written with four digits of 1/√2 pass without a warning.
@@ -118,7 +118,7 @@ fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
     unit
 }
 
-fn limits(raw: &RawJoint, place: &TextPosition, report: &mut Report) -> Limits {
+fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
     let (name, limit) = (&raw.urdf.name, &raw.urdf.limit);
     let mut limits = Limits::NONE;
     if raw.urdf.joint_type != JointType::Continuous {

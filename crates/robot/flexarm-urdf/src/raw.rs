@@ -12,14 +12,14 @@ use roxmltree::Node;
 use urdf_rs::JointType;
 
 use crate::lint::{JointMarks, OriginMark, PlainUrdf, lint};
-use crate::place::TextPosition;
 use crate::report::Report;
 use crate::transmission::Transmission;
 use crate::xml::Lines;
+use flexarm_settings::Place;
 
 pub(crate) struct RawRobot {
     pub(crate) name: String,
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     /// Macros defined in a file that calls none of them.
     pub(crate) idle_macros: Vec<String>,
     pub(crate) links: Vec<RawLink>,
@@ -31,7 +31,7 @@ pub(crate) struct RawRobot {
 
 pub(crate) struct RawLink {
     pub(crate) name: String,
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     pub(crate) inertial: Option<RawInertial>,
     pub(crate) visuals: Vec<RawVisual>,
     /// Shapes of readable `<collision>` elements; faults of others are not reported.
@@ -40,7 +40,7 @@ pub(crate) struct RawLink {
 
 /// Mass and inertia about the centre of mass, in axes I; `X_LI` as written.
 pub(crate) struct RawInertial {
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     pub(crate) X_LI: Pose,
     pub(crate) mass: f64,
     pub(crate) inertia_I: Matrix3<f64>,
@@ -49,7 +49,7 @@ pub(crate) struct RawInertial {
 }
 
 pub(crate) struct RawVisual {
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     pub(crate) X_LV: Pose,
     /// Visual, or a collision converted to a visual without material.
     pub(crate) urdf: urdf_rs::Visual,
@@ -58,15 +58,15 @@ pub(crate) struct RawVisual {
 pub(crate) struct RawJoint {
     pub(crate) urdf: urdf_rs::Joint,
     pub(crate) X_PJ: Pose,
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     /// Place of `<axis>`; `None` if it is missing and `urdf` has the default.
-    pub(crate) axis: Option<TextPosition>,
+    pub(crate) axis: Option<Place>,
     /// Place of `<limit>`; `None` if it is missing and `urdf` has zeros.
-    pub(crate) limit: Option<TextPosition>,
+    pub(crate) limit: Option<Place>,
     /// Acceleration, deceleration and jerk of `<limit>`; infinite if not given.
     pub(crate) rates: [f64; 3],
     /// Place of `<mimic>`, or of the joint if there is none.
-    pub(crate) mimic: TextPosition,
+    pub(crate) mimic: Place,
     /// Whether some part could not be read; disables further checks.
     pub(crate) faulty: bool,
 }
@@ -90,7 +90,7 @@ pub(crate) fn read_robot(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Rep
 }
 
 /// Reports that `urdf_rs` rejects a robot without a fault.
-fn not_read(place: &TextPosition, reason: &dyn std::fmt::Display, report: &mut Report) {
+fn not_read(place: &Place, reason: &dyn std::fmt::Display, report: &mut Report) {
     let help = "please report it with the file; do names hold unusual characters?";
     report.error(place, "not-read", format!("urdf-rs does not read this robot: {reason}"), help);
 }

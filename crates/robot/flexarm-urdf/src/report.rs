@@ -1,8 +1,6 @@
 //! Collects the findings of the checks, so that all faults are reported together.
 
-use flexarm_settings::{Finding, Severity};
-
-use crate::place::TextPosition;
+use flexarm_settings::{Finding, Place, Severity};
 
 /// Faults, warnings and notes about one file.
 #[derive(Default)]
@@ -16,33 +14,15 @@ pub struct Report {
 }
 
 impl Report {
-    pub(crate) fn error(
-        &mut self,
-        place: &TextPosition,
-        code: &str,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) {
+    pub(crate) fn error(&mut self, place: &Place, code: &str, message: impl Into<String>, help: impl Into<String>) {
         self.issues.push(Finding::error(code, place.to_string(), message, help));
     }
 
-    pub(crate) fn warning(
-        &mut self,
-        place: &TextPosition,
-        code: &str,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) {
+    pub(crate) fn warning(&mut self, place: &Place, code: &str, message: impl Into<String>, help: impl Into<String>) {
         self.remarks.push(Finding::warning(code, place.to_string(), message, help));
     }
 
-    pub(crate) fn note(
-        &mut self,
-        place: &TextPosition,
-        code: &str,
-        message: impl Into<String>,
-        help: impl Into<String>,
-    ) {
+    pub(crate) fn note(&mut self, place: &Place, code: &str, message: impl Into<String>, help: impl Into<String>) {
         self.remarks.push(Finding::warning(code, place.to_string(), message, help).as_note());
     }
 

@@ -2,18 +2,17 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry as Shape;
 
 use crate::geometry::{Geometry, Visual};
-use crate::mesh::{MassProperties, MeshError, TriangleMesh, UpAxis, load_with_remarks};
-use crate::place::TextPosition;
+use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_with_remarks};
 use crate::raw::{RawRobot, RawVisual, color};
 use crate::report::Report;
 use crate::resolve::Resolver;
+use flexarm_settings::Place;
 
 /// Size above which geometry was probably drawn in millimetres (m).
 const LARGE: f64 = 30.0;
@@ -25,22 +24,7 @@ pub(crate) struct LinkShape {
     /// Bounding box of all shapes in link axes; `None` if there are none or one is unknown.
     pub(crate) bounds: Option<(Vector3<f64>, Vector3<f64>)>,
     /// Poses `X_LV` and mass properties of all shapes, or the reason why one is unknown.
-    pub(crate) solids: Result<Vec<(Pose, MassProperties)>, NoEstimate>,
-}
-
-/// Reason why the inertia of a link cannot be estimated from its shapes.
-#[derive(Clone, Debug, thiserror::Error)]
-pub(crate) enum NoEstimate {
-    #[error("meshes were not looked into")]
-    NotInspected,
-    #[error("the mesh {uri:?} was not found")]
-    NotFound { uri: String },
-    #[error("{}", with_source(&**.0))]
-    Unreadable(Rc<MeshError>),
-    #[error("its mesh encloses no volume")]
-    NoVolume,
-    #[error("there is no shape")]
-    NoShape,
+    pub(crate) solids: Result<Vec<(Pose, MassProperties)>, String>,
 }
 
 /// Returns all visuals, with their mesh files.
@@ -110,7 +94,7 @@ pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report)
             let mut bounds: Option<(Vector3<f64>, Vector3<f64>)> = None;
             let mut solids = Ok(Vec::new());
             for (raw, visual) in link.visuals.iter().zip(visuals.by_ref()) {
-                match meshes.look_into(visual, &raw.place, report) {
+                match meshes.inspect(visual, &raw.place, report) {
                     Ok((box_of_visual, solid)) => {
                         bounds = Some(bounds.map_or(box_of_visual, |(low, high)| {
                             (low.inf(&box_of_visual.0), high.sup(&box_of_visual.1))
@@ -130,11 +114,11 @@ pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report)
 
 /// Shape data without inspection of files.
 pub(crate) fn unknown(robot: &RawRobot) -> Vec<LinkShape> {
-    let unknown = || LinkShape { bounds: None, solids: Err(NoEstimate::NotInspected) };
+    let unknown = || LinkShape { bounds: None, solids: Err("meshes were not inspected".to_owned()) };
     robot.links.iter().map(|_| unknown()).collect()
 }
 
-fn check_size(link: &str, place: &TextPosition, bounds: Option<(Vector3<f64>, Vector3<f64>)>, report: &mut Report) {
+fn check_size(link: &str, place: &Place, bounds: Option<(Vector3<f64>, Vector3<f64>)>, report: &mut Report) {
     let Some((low, high)) = bounds else { return };
     let size = (high - low).norm();
     if size > LARGE {
@@ -151,30 +135,29 @@ type Bounds = (Vector3<f64>, Vector3<f64>);
 /// Mesh files, each read once.
 #[derive(Default)]
 struct Meshes {
-    loaded: HashMap<PathBuf, Result<TriangleMesh, Rc<MeshError>>>,
+    loaded: HashMap<PathBuf, Result<TriangleMesh, String>>,
 }
 
 impl Meshes {
     /// Box in link axes and mass properties in V of one visual.
-    fn look_into(
+    fn inspect(
         &mut self,
         visual: &Visual,
-        place: &TextPosition,
+        place: &Place,
         report: &mut Report,
-    ) -> Result<(Bounds, MassProperties), NoEstimate> {
-        let unreadable = |error: MeshError| NoEstimate::Unreadable(Rc::new(error));
+    ) -> Result<(Bounds, MassProperties), String> {
         let (low_V, high_V, properties) = match &visual.geometry {
-            Geometry::Mesh { path: None, uri, .. } => return Err(NoEstimate::NotFound { uri: uri.clone() }),
+            Geometry::Mesh { path: None, uri, .. } => return Err(format!("the mesh {uri:?} was not found")),
             Geometry::Mesh { path: Some(path), scale, up_axis, .. } => {
                 let mesh = self.load(path, *up_axis, &visual.link, place, report);
-                let mesh = mesh.clone().map_err(NoEstimate::Unreadable)?.scaled(scale);
+                let mesh = mesh.clone()?.scaled(scale);
                 let (low, high) = mesh.bounds().unwrap_or_default();
                 (low, high, mesh.mass_properties())
             }
             shape => {
-                let mesh = shape.triangles().map_err(unreadable)?;
+                let mesh = shape.triangles().map_err(|error| error.to_string())?;
                 let (low, high) = mesh.bounds().unwrap_or_default();
-                (low, high, shape.mass_properties().map_err(unreadable)?)
+                (low, high, shape.mass_properties().map_err(|error| error.to_string())?)
             }
         };
         // Bounding box of the rotated box: slightly larger than that of the shape.
@@ -191,9 +174,9 @@ impl Meshes {
         path: &Path,
         up_axis: UpAxis,
         link: &str,
-        place: &TextPosition,
+        place: &Place,
         report: &mut Report,
-    ) -> &Result<TriangleMesh, Rc<MeshError>> {
+    ) -> &Result<TriangleMesh, String> {
         self.loaded.entry(path.to_owned()).or_insert_with(|| match load_with_remarks(path, up_axis) {
             Ok(loaded) => {
                 for remark in loaded.remarks {
@@ -202,17 +185,10 @@ impl Meshes {
                 Ok(loaded.mesh)
             }
             Err(error) => {
-                let message = format!("link {link:?}: {}", with_source(&error));
+                let message = format!("link {link:?}: {error}");
                 report.warning(place, "unreadable-mesh", message, "export the mesh again, as STL for example");
-                Err(Rc::new(error))
+                Err(error.to_string())
             }
         })
-    }
-}
-
-fn with_source(error: &dyn std::error::Error) -> String {
-    match error.source() {
-        Some(source) => format!("{error}: {source}"),
-        None => error.to_string(),
     }
 }

@@ -34,8 +34,8 @@ pub fn tcp_candidates(mechanism: &Mechanism) -> Vec<&str> {
     // A stable sort keeps the order of the file among equals.
     ends.sort_by_key(|n| std::cmp::Reverse(depth.get(n).copied()));
 
-    let mut seen = HashSet::new();
-    candidates.into_iter().chain(ends).chain(ambiguous).filter(|n| seen.insert(*n)).collect()
+    let mut visited = HashSet::new();
+    candidates.into_iter().chain(ends).chain(ambiguous).filter(|n| visited.insert(*n)).collect()
 }
 
 /// Whether the name is the tool name with a prefix: `left_tool0`, `left-tool0`, `left/tool0` for

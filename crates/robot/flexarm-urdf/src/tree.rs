@@ -8,9 +8,9 @@ use std::collections::{HashMap, HashSet};
 
 use flexarm_kinematics::Pose;
 
-use crate::place::TextPosition;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::{Report, did_you_mean, quoted};
+use flexarm_settings::Place;
 use flexarm_settings::closest;
 
 /// Reports duplicate names of links and joints; later checks use only the first.
@@ -28,7 +28,7 @@ pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
     }
     let links = robot.links.iter().map(|link| ("link", "duplicate-link", &link.name, &link.place));
     let joints = robot.joints.iter().map(|joint| ("joint", "duplicate-joint", &joint.urdf.name, &joint.place));
-    let mut first: HashMap<(&str, &str), &TextPosition> = HashMap::new();
+    let mut first: HashMap<(&str, &str), &Place> = HashMap::new();
     for (kind, code, name, place) in links.chain(joints) {
         if let Some(first) = first.get(&(kind, name.as_str())) {
             let message = format!("{kind} {name:?} is defined twice, first at {first}");

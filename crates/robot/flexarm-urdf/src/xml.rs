@@ -4,52 +4,50 @@
 
 use std::borrow::Cow;
 use std::fmt::Display;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use flexarm_settings::Finding;
+use flexarm_settings::{Finding, Place};
 use roxmltree::{Document, Error, Node};
-
-use crate::place::TextPosition;
 
 /// Start offsets of all lines, to convert byte offsets to places without scanning the text each
 /// time.
 pub struct Lines<'t> {
-    file: PathBuf,
+    file: Place,
     text: &'t str,
     starts: Vec<usize>,
     /// Origin of each line, if the text was generated from other files.
-    origins: &'t [TextPosition],
+    origins: &'t [Place],
 }
 
 impl<'t> Lines<'t> {
     /// Finds the lines of a text.
     pub fn new(file: &Path, text: &'t str) -> Self {
         let starts = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        Self { file: file.to_owned(), text, starts, origins: &[] }
+        Self { file: Place::of_file(file.display()), text, starts, origins: &[] }
     }
 
     /// Sets the origins of the lines of a generated text.
-    pub(crate) fn with_origins(self, origins: &'t [TextPosition]) -> Self {
+    pub(crate) fn with_origins(self, origins: &'t [Place]) -> Self {
         Self { origins, ..self }
     }
 
     /// The place of a byte offset.
-    pub(crate) fn place(&self, offset: usize) -> TextPosition {
+    pub(crate) fn place(&self, offset: usize) -> Place {
         let row = self.starts.partition_point(|&start| start <= offset) - 1;
         if let Some(origin) = self.origins.get(row) {
             return origin.clone();
         }
         let before = self.text.get(self.starts[row]..offset).unwrap_or("");
-        TextPosition { file: self.file.clone(), line: row as u32 + 1, column: before.chars().count() as u32 + 1 }
+        self.file.at(row + 1, before.chars().count() + 1)
     }
 
     /// The place of the start tag of an element.
-    pub(crate) fn of(&self, node: Node<'_, '_>) -> TextPosition {
+    pub(crate) fn of(&self, node: Node<'_, '_>) -> Place {
         self.place(node.range().start)
     }
 
     /// Place after the last character that is not white space: the end of a truncated file.
-    fn end(&self) -> TextPosition {
+    fn end(&self) -> Place {
         self.place(self.text.trim_end().len())
     }
 }
@@ -96,8 +94,8 @@ pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>
 
 /// Returns the text with all prefixes declared at its root, and those that it does not declare
 /// itself with their places. Other readers of URDF ignore name spaces.
-pub(crate) fn declared<'t>(text: &'t str, lines: &Lines<'_>) -> (Cow<'t, str>, Vec<(String, TextPosition)>) {
-    let mut missing: Vec<(String, TextPosition)> = Vec::new();
+pub(crate) fn declared<'t>(text: &'t str, lines: &Lines<'_>) -> (Cow<'t, str>, Vec<(String, Place)>) {
+    let mut missing: Vec<(String, Place)> = Vec::new();
     let mut root = None;
     for (at, tag, _) in tags(text).filter(|(_, tag, _)| !tag[1..].starts_with(['!', '?', '/'])) {
         let mut words = tag.trim_start_matches('<').split_whitespace();
@@ -172,7 +170,7 @@ fn describe(text: &str, lines: &Lines<'_>, error: &Error) -> Finding {
 }
 
 /// Error about a text that is truncated or not well-formed XML.
-pub(crate) fn issue(place: TextPosition, found: impl Display, expected: impl Display) -> Finding {
+pub(crate) fn issue(place: Place, found: impl Display, expected: impl Display) -> Finding {
     let help = "is the file complete? Export or copy it again, or mend it here";
     Finding::error("malformed-xml", place.to_string(), format!("found {found}, expected {expected}"), help)
 }
@@ -182,7 +180,7 @@ fn shown(byte: u8) -> String {
 }
 
 /// Place of an error, if it has one.
-fn position(lines: &Lines<'_>, error: &Error) -> Option<TextPosition> {
+fn position(lines: &Lines<'_>, error: &Error) -> Option<Place> {
     let without = matches!(
         error,
         Error::NoRootNode
@@ -194,7 +192,7 @@ fn position(lines: &Lines<'_>, error: &Error) -> Option<TextPosition> {
             | Error::UnexpectedEndOfStream
     );
     let pos = error.pos();
-    (!without).then(|| TextPosition { file: lines.file.clone(), line: pos.row, column: pos.col })
+    (!without).then(|| lines.file.at(pos.row as usize, pos.col as usize))
 }
 
 /// Whether the text ends within a tag, as truncated files usually do.

@@ -1,10 +1,9 @@
 //! Errors of making or exporting a link, with cause and numbers, and whether the input or the run
 //! is at fault.
 
-mod job;
 mod word;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexarm_fem::mesh_link::MeshLinkError;
 use flexarm_fem::reduction::ReductionError;
@@ -12,7 +11,6 @@ use flexarm_fem::sparse::ModesError;
 use flexarm_files::{FileError, TextFileError};
 use flexarm_settings::Fault;
 
-pub use job::JobError;
 pub use word::WordError;
 
 /// An error of making or exporting a link.
@@ -28,12 +26,10 @@ pub enum LinkError {
     /// Several errors of one job.
     #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
     Several(Vec<LinkError>),
-    /// An invalid number or name in a job.
-    #[error(transparent)]
-    Job(#[from] JobError),
-    /// No file of an import, or interface frames that do not match its matrices.
+    /// A number or name of a job is invalid or missing, or a file does not hold the data that a job
+    /// needs: what was found and what is expected.
     #[error("{0}")]
-    ImportJob(String),
+    Job(String),
     /// An invalid reduced-link file.
     #[error(transparent)]
     Flex(#[from] Box<flexarm_fem::FlexFileError>),
@@ -75,8 +71,8 @@ pub enum LinkError {
 
 impl LinkError {
     /// Error for a file that does not hold the required data.
-    pub(crate) fn file(path: impl Into<PathBuf>, what: impl Into<String>) -> Self {
-        Self::Files(FileError::Unusable { path: path.into(), what: what.into() })
+    pub(crate) fn content(path: impl AsRef<Path>, what: impl std::fmt::Display) -> Self {
+        Self::Job(format!("{}: {what}", path.as_ref().display()))
     }
 
     /// Returns a single error as it is, several as [`LinkError::Several`].

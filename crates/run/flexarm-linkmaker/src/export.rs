@@ -21,7 +21,7 @@ use flexarm_settings::{Setting, Words};
 use nalgebra::{DMatrix, Translation3};
 use serde::Serialize;
 
-use crate::{JobError, LinkError, stamp};
+use crate::{LinkError, stamp};
 
 /// Tolerance of writing and reading back, relative to `sqrt(k_ii k_jj)`.
 const DIGITS: f64 = 1e-12;
@@ -196,7 +196,12 @@ fn nodes(job: &ExportJob, interfaces: usize) -> Result<Vec<i64>, LinkError> {
     }
     let distinct = job.nodes.iter().collect::<std::collections::BTreeSet<_>>().len() == job.nodes.len();
     if job.nodes.len() != interfaces || !distinct || job.nodes.iter().any(|node| !(1..=99_999_999).contains(node)) {
-        return Err(JobError::NodeNumbers { found: job.nodes.clone(), interfaces }.into());
+        return Err(LinkError::Job(format!(
+            "{} has {:?}; {interfaces} distinct numbers between 1 and 99999999 are required, one per interface, \
+             proximal first",
+            Setting::Nodes,
+            job.nodes
+        )));
     }
     Ok(job.nodes.clone())
 }

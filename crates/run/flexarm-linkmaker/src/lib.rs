@@ -65,7 +65,7 @@ mod stamp;
 mod stopwatch;
 pub mod yardsticks;
 
-pub use error::{JobError, LinkError, WordError};
+pub use error::{LinkError, WordError};
 pub use material_entry::{MaterialConstants, MaterialEntry};
 pub use stopwatch::Stopwatch;
 

@@ -45,7 +45,7 @@ pub fn least_density(mass: f64, inertia: &Matrix3<f64>) -> f64 {
 
 /// Returns warnings about implausible stiffness or mass of a link made from files.
 pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
-    let mut doubts = Vec::new();
+    let mut caveats = Vec::new();
     let length = (link.X_LB.translation.vector - link.X_LA.translation.vector).norm();
     let speed = sound_speed(&link.split.K_S, length, whole.mass).filter(|_| whole.mass > 0.0 && length > 0.0);
     if let Some(speed) = speed.filter(|speed| !SOUND.contains(speed)) {
@@ -59,7 +59,7 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
             "from its stiffness and mass, the speed of sound along the link is {speed:.3e} m/s, expected {end} \
              ({likely})"
         );
-        doubts.push(Finding::warning("link-sound", "", said, "").measured(speed, yardstick));
+        caveats.push(Finding::warning("link-sound", "", said, "").measured(speed, yardstick));
     }
     let (com, gyration) = (whole.com.norm(), (whole.inertia.symmetric_eigenvalues().max() / whole.mass).sqrt());
     let size = [link.X_LA, link.X_LB].map(|X| X.translation.vector.norm()).into_iter().fold(length, f64::max);
@@ -71,7 +71,7 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
                 "{what} {value:.3e} m, with interfaces within {size:.3e} m: expected at most {BEYOND} times that (lengths in mm, \
                  or inertia in kg mm2?)"
             );
-            doubts.push(Finding::warning(code, "", said, "").measured(value, BEYOND * size));
+            caveats.push(Finding::warning(code, "", said, "").measured(value, BEYOND * size));
         }
     }
     let density = least_density(whole.mass, &whole.inertia);
@@ -80,9 +80,9 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
             "from its mass and inertia, the density of the link is at least {density:.3e} kg/m3, above that of \
              osmium, {OSMIUM} (mass in g, or lengths in m instead of mm?)"
         );
-        doubts.push(Finding::warning("link-density", "", said, "").measured(density, OSMIUM));
+        caveats.push(Finding::warning("link-density", "", said, "").measured(density, OSMIUM));
     }
-    doubts
+    caveats
 }
 
 /// Returns a warning about an interface whose point is far from its nodes.

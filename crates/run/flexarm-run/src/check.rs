@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_trajectory::{MISSING_LIMIT, TrajectoryError};
+use flexarm_trajectory::MISSING_LIMIT;
 use nalgebra::Vector6;
 
 use crate::arm::options::Modelling;
@@ -124,7 +124,7 @@ fn check_loads(robot: &Robot, motion: Option<&Motion>, path: &Path, findings: &m
 fn motion_without_robot(path: &Path, options: &MotionOptions) -> Option<Finding> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let cause = motion_formats::read(&file).err()?;
-    let follows = matches!(&cause, Error::Trajectory(TrajectoryError::File(file)) if file.code == MISSING_LIMIT);
+    let follows = matches!(&cause, Error::Motion(fault) if fault.code == MISSING_LIMIT);
     (!follows).then(|| error("trajectory", path.display().to_string(), &cause))
 }
 
@@ -135,8 +135,7 @@ fn load_findings(cause: Error, path: &Path, findings: &mut Vec<Finding>) {
         Error::Several(errors) => errors.into_iter().for_each(|cause| load_findings(cause, path, findings)),
         Error::Urdf(cause) => findings.extend(cause.into_findings()),
         Error::RobotFile(e) => {
-            let location = format!("{}:{}:{}", e.path.display(), e.line, e.column);
-            findings.push(error("robot-file", location, &e.message));
+            findings.push(error("robot-file", e.place().to_string(), &e.message));
         }
         Error::File { path, what } => findings.push(error("missing-file", path.display().to_string(), &what)),
         Error::Flex(cause) => findings.push(error("reduced-link", file, &cause)),

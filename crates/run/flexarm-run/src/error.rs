@@ -5,18 +5,18 @@
 //! ([`flexarm_settings::name_settings`]). The treatment of an error, such as the exit code of a
 //! process, is up to the interface.
 
-mod loops;
 mod picture;
 mod recording;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexarm_files::{FileError, TextFileError as RobotFileError};
 use flexarm_linkmaker::LinkError;
-use flexarm_settings::{OutOfRange, Setting, known_names};
+use flexarm_motion_io::MotionError;
+use flexarm_settings::{Finding, OutOfRange, Setting, known_names};
+use flexarm_trajectory::TrajectoryError;
 
 pub use flexarm_settings::Fault;
-pub use loops::LoopError;
 pub(crate) use picture::NoPicture;
 pub use recording::RecordingError;
 
@@ -24,7 +24,7 @@ pub use recording::RecordingError;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// A requested file or folder does not exist or is not readable.
+    /// A requested file or folder does not exist, is not readable, or cannot be used in this place.
     #[error("{}: {what}", path.display())]
     File {
         /// Path.
@@ -68,25 +68,23 @@ pub enum Error {
         /// Cause.
         source: std::io::Error,
     },
-    /// The trajectory has an error.
+    /// A motion cannot be made, changed or written as requested.
     #[error(transparent)]
-    Trajectory(#[from] flexarm_trajectory::TrajectoryError),
+    Trajectory(TrajectoryError),
     /// A robot program cannot be read.
     #[error(transparent)]
     Program(#[from] Box<flexarm_programs::ProgramError>),
     /// The arm cannot follow a TCP path.
-    #[error("{}: {source}{}", path.display(), assumed(notes))]
+    #[error("{finding}{}", assumed(notes))]
     Path {
-        /// Path of the motion.
-        path: PathBuf,
-        /// Location and cause.
-        source: Box<flexarm_path::PathError>,
+        /// Place and cause.
+        finding: Box<Finding>,
         /// Assumptions made before.
         notes: Vec<String>,
     },
-    /// A motion file of another program has an error.
+    /// The content of a motion file is wrong, or does not fit the robot.
     #[error(transparent)]
-    Motion(#[from] flexarm_motion_io::MotionError),
+    Motion(Box<Finding>),
     /// The trajectory exceeds joint limits.
     #[error(
         "{}: the trajectory passes {} joint limits:\n  {}\nslow it down, change it, or run it anyway with {}",
@@ -121,8 +119,13 @@ pub enum Error {
     #[error("{0}")]
     Pose(String),
     /// A closed loop does not fit the robot, or does not close at a pose.
-    #[error(transparent)]
-    Loop(#[from] LoopError),
+    #[error("loop {name:?}: {what}")]
+    Loop {
+        /// Name of the loop.
+        name: String,
+        /// Cause and remedy, with the time of a motion.
+        what: String,
+    },
     /// A load or a change of payload is invalid: what was found, what was expected and the remedy.
     #[error("{0}")]
     Load(String),
@@ -195,6 +198,11 @@ impl Error {
         Self::Value(format!("{what} has the entry {found}, expected finite numbers"))
     }
 
+    /// Error about the content of a motion file, or about a motion that does not fit the robot.
+    pub(crate) fn motion(path: &Path, what: impl Into<String>) -> Self {
+        Self::Motion(Box::new(Finding::error("motion", path.display().to_string(), what, "")))
+    }
+
     /// Error about joint values of a motion that do not fit its times.
     pub(crate) fn samples(found: usize, times: usize, joints: usize) -> Self {
         Self::Pose(format!(
@@ -252,6 +260,26 @@ fn assumed(notes: &[String]) -> String {
         lines
     } else {
         format!("\nassumptions about the program (a path file with [program] can state them):{lines}")
+    }
+}
+
+impl From<TrajectoryError> for Error {
+    fn from(error: TrajectoryError) -> Self {
+        match error {
+            TrajectoryError::Read { path, source } => Self::File { path, what: format!("cannot be read: {source}") },
+            TrajectoryError::File(finding) => Self::Motion(finding),
+            other => Self::Trajectory(other),
+        }
+    }
+}
+
+impl From<MotionError> for Error {
+    fn from(error: MotionError) -> Self {
+        match error {
+            MotionError::Read { path, source } => Self::File { path, what: format!("cannot be read: {source}") },
+            MotionError::Content(finding) => Self::Motion(finding),
+            other => Self::Value(other.to_string()),
+        }
     }
 }
 

@@ -42,7 +42,7 @@ pub use arm::recursions::Recursions;
 pub use arm::{Arm, Owner};
 pub use caveat::{Finding, Severity};
 pub use check::{check, check_with_loads, check_with_motion};
-pub use error::{Error, ExternalError, Fault, LoopError, RecordingError};
+pub use error::{Error, ExternalError, Fault, RecordingError};
 pub use flexarm_linkmaker::Stopwatch;
 pub use motions::applied_load::AppliedLoad;
 pub use motions::motion::{HeldJoint, Motion};

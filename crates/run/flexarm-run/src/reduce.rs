@@ -16,8 +16,9 @@
 use flexarm_fem::RigidPart;
 use flexarm_flexlink::{SubstitutionError, distal_joint};
 use flexarm_kinematics::{Joint, Pose};
+use flexarm_settings::Finding;
 use flexarm_settings::Setting;
-use flexarm_urdf::{ReadOptions, read_urdf};
+use flexarm_urdf::{ReadOptions, UrdfError, read_urdf};
 
 use crate::error::Error;
 
@@ -50,12 +51,14 @@ pub fn reduce(
 /// Returns the link of a robot with the joints on it, for [`Reduction::finish`].
 ///
 /// # Errors
-/// [`Error::Urdf`]; [`Error::File`] if the link does not exist, or if its joint at B is ambiguous
-/// or missing.
+/// [`Error::Urdf`], also if the link does not exist, or if its joint at B is ambiguous or missing.
 pub fn urdf_link(entry: &UrdfEntry, options: &ReadOptions) -> Result<UrdfLink, Error> {
     let mechanism = read_urdf(&entry.file, options)?.mechanism;
     let X_LB = distal_joint(&mechanism, &entry.link, entry.joint.as_deref()).map(|joint| joint.X_PJ);
-    let X_LB = X_LB.map_err(|error| Error::File { path: entry.file.clone(), what: no_distal_joint(&error) })?;
+    let X_LB = X_LB.map_err(|error| {
+        let place = entry.file.display().to_string();
+        UrdfError::from(Box::new(Finding::error("distal-joint", place, no_distal_joint(&error), "")))
+    })?;
     let leads_on = |joint: &Joint| joint.parent == entry.link;
     let on_link = mechanism.joints.iter().filter(|joint| leads_on(joint) || joint.child == entry.link);
     let joints = on_link.map(|joint| {

@@ -12,6 +12,7 @@ use flexarm_run::internals::{
     signed_von_mises,
 };
 use flexarm_run::{Modelling, Robot, TCP_FRAME, ToolPath};
+use flexarm_settings::Place;
 use flexarm_stepping::{Held, Observation, Plant, Spring};
 use nalgebra::{DVector, Matrix3, Point3, Rotation3, Vector3};
 
@@ -140,7 +141,7 @@ fn a_gearbox_of_six_coordinates_is_judged_by_its_rotations() {
 
 fn a_move(line: usize, span_s: [f64; 2]) -> PlannedMove {
     PlannedMove {
-        line,
+        place: Place::of_file("p.src").line(line),
         statement: "line".into(),
         span_s,
         top_m_s: Some(1.0),

@@ -184,29 +184,12 @@ pub enum LobesError {
         /// Cause.
         source: ChatterError,
     },
-    /// Neither the arm nor the tool is flexible.
-    #[error("nothing is elastic: the robot has no flexible link and no elastic drive, and the tool has no mode")]
-    NothingYields,
     /// The feed is parallel to the tool's axis.
     #[error("the feed is parallel to the tool axis: set a feed direction across the axis (feed = [...] in [tool])")]
     FeedAlongAxis,
-    /// The feed is unknown.
-    #[error("the motion never moves the tool across its axis: set the feed direction (feed = [...] in [tool])")]
-    NoFeed,
-    /// Too few poses along the motion.
-    #[error("{found} poses along the motion: expected at least {least}")]
-    Places {
-        /// Requested number.
-        found: usize,
-        /// Minimum number.
-        least: usize,
-    },
-    /// The maximum depth is not a positive number.
-    #[error("the maximum depth of cut is {found} m, expected a positive number")]
-    Deepest {
-        /// Value found (m).
-        found: f64,
-    },
+    /// Nothing is elastic, the feed is unknown, or a number is out of range.
+    #[error("{0}")]
+    Input(String),
     /// A spindle speed is not a positive number.
     #[error("the spindle speed is {found} 1/min, expected a positive number")]
     Speed {
@@ -307,7 +290,9 @@ fn check_speeds(rpm: &[f64]) -> Result<(), Error> {
 
 fn check_deepest(depth_m: f64) -> Result<(), Error> {
     if !(depth_m.is_finite() && depth_m > 0.0) {
-        return Err(LobesError::Deepest { found: depth_m }.into());
+        return Err(
+            LobesError::Input(format!("the maximum depth of cut is {depth_m} m, expected a positive number")).into()
+        );
     }
     Quantity::LENGTH.check("the maximum depth of cut", depth_m)?;
     Ok(())

@@ -99,7 +99,7 @@ impl CutPose {
         n: usize,
     ) -> Result<(Vec<Self>, usize), Error> {
         if n < MIN_PLACES {
-            return Err(LobesError::Places { found: n, least: MIN_PLACES }.into());
+            return Err(LobesError::Input(format!("{n} poses along the motion: expected at least {MIN_PLACES}")).into());
         }
         let arm = robot.model(modelling)?;
         let (mut places, mut left_out) = (Vec::new(), 0);
@@ -112,7 +112,14 @@ impl CutPose {
             let posed = Posed::new(arm.clone(), q)?;
             places.push(Self::new(posed, tool, Some(t), Some(velocity / velocity.norm()))?);
         }
-        if places.is_empty() { Err(LobesError::NoFeed.into()) } else { Ok((places, left_out)) }
+        if places.is_empty() {
+            {
+                let mend = "set the feed direction (feed = [...] in [tool])";
+                Err(LobesError::Input(format!("the motion never moves the tool across its axis: {mend}")).into())
+            }
+        } else {
+            Ok((places, left_out))
+        }
     }
 
     fn new(posed: Posed, tool: &CuttingTool, time_s: Option<f64>, along: Option<Vector3<f64>>) -> Result<Self, Error> {
@@ -132,7 +139,8 @@ impl CutPose {
             LobesError::Chatter { place: pose_in_words(&posed.joints, &posed.at, &posed.prismatic), source }
         })?;
         if structure.poles().is_empty() {
-            return Err(LobesError::NothingYields.into());
+            let what = "the robot has no flexible link and no elastic drive, and the tool has no mode";
+            return Err(LobesError::Input(format!("nothing is elastic: {what}")).into());
         }
         Ok(Self { feed: R_WC.column(0).into(), axis, structure, time_s, posed, linear })
     }

@@ -5,9 +5,10 @@ use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_log::RecordingFormat;
+use flexarm_settings::Place;
 
 use super::program::{self, Corrected, ProgramFigures};
-use super::{CompensateRequest, Compensation, MotionPair, SAMPLE_S, page};
+use super::{CompensateError, CompensateRequest, Compensation, MotionPair, SAMPLE_S, page};
 use flexarm_run::motion_report::{check_motion_outputs, motion_texts};
 use flexarm_run::{Arm, Error, Finding, Motion, Robot, Scenario};
 
@@ -65,9 +66,9 @@ impl Files {
         let ProgramFigures { targets, corrected: done, left, residual_m, .. } = &corrected.figures;
         if let (true, Some(first)) = (done < targets, left.first()) {
             let text = format!(
-                "{} of {targets} targets of the program are unchanged, the first in line {} ({}): {}",
+                "{} of {targets} targets of the program are unchanged, the first at {} ({}): {}",
                 targets - done,
-                first.line,
+                Place::of_file(place[0].display()).line(first.line),
                 first.statement,
                 first.why
             );
@@ -121,8 +122,8 @@ impl Files {
         let lost = |name: &&PathBuf| home.is_some() && name.parent().and_then(|f| f.canonicalize().ok()) == home;
         match names.iter().find(lost) {
             Some(name) => {
-                let what = "this is the program to be corrected: choose another output folder".into();
-                Err(Error::File { path: name.clone(), what })
+                let what = "this is the program to be corrected: choose another output folder";
+                Err(CompensateError::Input(format!("{}: {what}", name.display())).into())
             }
             None => Ok(()),
         }

@@ -181,12 +181,18 @@ impl<'a> Job<'a> {
     }
 
     /// Runs a motion on an arm, with the loads of the scenario.
-    pub(super) fn seen(&self, arm: &Arc<Arm>, run: &RunOptions, motion: &Motion) -> Result<RunResult, Error> {
-        self.seen_until(arm, run, motion, 0)
+    pub(super) fn simulated(&self, arm: &Arc<Arm>, run: &RunOptions, motion: &Motion) -> Result<RunResult, Error> {
+        self.simulated_until(arm, run, motion, 0)
     }
 
     /// Runs a motion that is held at its end for `beyond` more samples.
-    fn seen_until(&self, arm: &Arc<Arm>, run: &RunOptions, motion: &Motion, beyond: usize) -> Result<RunResult, Error> {
+    fn simulated_until(
+        &self,
+        arm: &Arc<Arm>,
+        run: &RunOptions,
+        motion: &Motion,
+        beyond: usize,
+    ) -> Result<RunResult, Error> {
         let options =
             RunOptions { log_rate_hz: 1.0 / self.step_s(), with_twin: false, ignore_limits: true, ..run.clone() };
         let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
@@ -228,7 +234,7 @@ impl<'a> Job<'a> {
     /// held at the end.
     fn error(&self, change: &DMatrix<f64>, beyond: usize) -> Result<DMatrix<f64>, Error> {
         let motion = self.moved_and_held(change, beyond)?;
-        Ok(self.seen_until(self.arm, &self.request.run, &motion, beyond)?.error)
+        Ok(self.simulated_until(self.arm, &self.request.run, &motion, beyond)?.error)
     }
 
     /// Returns a motion with the loads, payloads and start of the scenario.
@@ -257,8 +263,8 @@ impl<'a> Job<'a> {
     /// Returns the arm held at the start of the motion: servo gains and damping of a run are those
     /// of its start.
     fn at_start(&self) -> Result<Plant, Error> {
-        let held = Held(self.q.column(0).iter().copied().collect());
-        let plant = self.arm.plant(Arc::new(held)).map_err(|error| self.arm.explained(error))?;
+        let fixed = Held(self.q.column(0).iter().copied().collect());
+        let plant = self.arm.plant(Arc::new(fixed)).map_err(|error| self.arm.explained(error))?;
         let mut axes = plant.servo.iter().flat_map(|servo| &servo.axes);
         match axes.find(|axis| axis.position_gain * axis.velocity_gain <= 0.0) {
             Some(axis) => {

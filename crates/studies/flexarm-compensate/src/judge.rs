@@ -44,7 +44,7 @@ impl Judge {
     }
 
     pub(super) fn figures(&self, job: &Job<'_>, motion: &Motion) -> Result<PlantResult, Error> {
-        let RunResult { error, efforts } = job.seen(&self.arm, &self.run, motion)?;
+        let RunResult { error, efforts } = job.simulated(&self.arm, &self.run, motion)?;
         let distance = distances(&error);
         let turns = error.column_iter().map(|e| e.rows(3, 3).norm()).fold(0.0, f64::max);
         let figures = ErrorFigures {

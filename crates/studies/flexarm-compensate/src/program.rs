@@ -14,13 +14,14 @@ use flexarm_kinematics::{
 use flexarm_path::program::{Item, Move, MoveKind, Target};
 use flexarm_path::{PathOptions, ProgramArm, base_of, target_at, target_joints, tool_of};
 use flexarm_programs::{NewTarget, ProgramText};
+use flexarm_settings::Place;
 use flexarm_stepping::{Held, InertiaChange, Plant, StepError, TargetError, linearise, static_targets};
 use nalgebra::{DVector, Translation3, Vector3, Vector6};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::CompensateRequest;
 use super::job::averaged;
+use super::{CompensateError, CompensateRequest};
 use flexarm_run::tool_path::{Cell, Overrides, program_text};
 use flexarm_run::{AppliedLoad, Arm, Error, Motion, Robot, Scenario};
 
@@ -131,7 +132,7 @@ pub(super) fn corrected(
     let understood = |bytes: &[u8], others: Vec<(PathBuf, Vec<u8>)>| -> Result<Understood, Error> {
         let text = program_text(path, bytes, &controller, others)?;
         let places = target_joints(&text.program, &controller, &PathOptions::default());
-        let failed = |source| Error::Path { path: path.clone(), source: Box::new(source), notes: Vec::new() };
+        let failed = |finding| Error::Path { finding, notes: Vec::new() };
         Ok(Understood { places: places.map_err(failed)?, text })
     };
     let old = understood(&flexarm_trajectory::bytes_of_file(path)?, Vec::new())?;
@@ -156,11 +157,11 @@ pub(super) fn corrected(
 
     // Interpret the written text as the controller will.
     let [(_, main), others @ ..] = &rewritten.files[..] else {
-        return Err(Error::File { path: path.clone(), what: "the program has no text".into() });
+        return Err(CompensateError::Input(format!("{}: the program has no text", path.display())).into());
     };
     let again = understood(main, others.to_vec())?;
     let judged = judged(&rest, &stops, &again.places, &left)
-        .map_err(|error| Error::File { path: path.clone(), what: error.to_string() })?;
+        .map_err(|error| CompensateError::Input(format!("{}: {error}", path.display())))?;
     let figures = ProgramFigures {
         files: rewritten.files.iter().map(|(file, _)| in_folder(folder, file).display().to_string()).collect(),
         corrected: rewritten.replaced.len(),
@@ -180,7 +181,7 @@ fn stops<'a>(program: &'a Understood, scenario: &Scenario) -> Vec<Stop<'a>> {
     let mut stops = Vec::new();
     for (item, (what, q)) in program.text.program.items.iter().zip(&program.places).enumerate() {
         let (Item::Move(of), Some(q)) = (what, q) else { continue };
-        let leg = planned.get(next).filter(|leg| leg.line == of.line && leg.statement == of.statement);
+        let leg = planned.get(next).filter(|leg| leg.place == of.place && leg.statement == of.statement);
         if let Some(leg) = leg {
             next += 1;
             let end = planned.get(next).map_or_else(|| scenario.duration_s(), |leg| leg.span_s[0]);
@@ -214,7 +215,7 @@ fn judged(
                 figures.residual_rad = figures.residual_rad.max(size(&after, 3));
             }
             Some((_, why)) if figures.left.len() < NAMED => figures.left.push(LeftTarget {
-                line: stop.of.line,
+                line: stop.of.place.line.unwrap_or(0),
                 statement: stop.of.statement.clone(),
                 why: why.clone(),
                 residual_m: size(&after, 0),
@@ -253,11 +254,11 @@ fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<
             "targets passed without a stop: {passed}; they are corrected for the loads at the time of passing"
         ));
     }
-    let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, stop.of.line)));
-    let changing: Vec<(f64, usize)> = changing.filter(|(change, _)| *change > CHANGES).collect();
-    if let Some((worst, line)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
+    let changing = stops.iter().filter_map(|stop| Some((rest.change(stop.rest_s)?, &stop.of.place)));
+    let changing: Vec<(f64, &Place)> = changing.filter(|(change, _)| *change > CHANGES).collect();
+    if let Some((worst, place)) = changing.iter().max_by(|a, b| a.0.total_cmp(&b.0)) {
         notes.push(format!(
-            "at {} targets the loads change while the arm is there, most in line {line} (up to {:.0} % of the \
+            "at {} targets the loads change while the arm is there, most at {place} (up to {:.0} % of the \
              maximum from the mean): the correction uses the mean load",
             changing.len(),
             100.0 * worst
@@ -283,7 +284,7 @@ type TargetValues = (NewTarget, Option<Vector3<f64>>);
 struct AtRest<'a> {
     arm: &'a ProgramArm<'a>,
     /// Flexible arm with motors held; each load is replaced by its mean over the rest at that time.
-    held: Plant,
+    fixed: Plant,
     /// Payload changes, in order of time.
     changes: Vec<InertiaChange>,
     tcp: Frame,
@@ -302,9 +303,9 @@ impl<'a> AtRest<'a> {
         request: &CompensateRequest,
         rests: Vec<[f64; 2]>,
     ) -> Result<Self, Error> {
-        let held = Held(vec![0.0; controller.model.n_actuated()]);
-        let held = arm.plant(Arc::new(held)).map_err(|error| arm.explained(error))?;
-        let sags = held.servo.iter().flat_map(|servo| &servo.axes).any(|axis| axis.integral_gain <= 0.0);
+        let fixed = Held(vec![0.0; controller.model.n_actuated()]);
+        let fixed = arm.plant(Arc::new(fixed)).map_err(|error| arm.explained(error))?;
+        let sags = fixed.servo.iter().flat_map(|servo| &servo.axes).any(|axis| axis.integral_gain <= 0.0);
         let rests: Arc<[[f64; 2]]> = rests.into();
         let mean = |load: &AppliedLoad| {
             let rests = rests.clone();
@@ -313,11 +314,11 @@ impl<'a> AtRest<'a> {
             })
         };
         let loads = scenario.loads.iter().map(mean).collect();
-        let acting = Scenario { loads, ..scenario.clone() }.acting_on(arm.robot(), &held.model)?;
-        let held = held.with_motors_held();
-        let held = held.with_timed_loads(acting.loads).map_err(|error| arm.explained(error))?;
+        let acting = Scenario { loads, ..scenario.clone() }.acting_on(arm.robot(), &fixed.model)?;
+        let fixed = fixed.with_motors_held();
+        let fixed = fixed.with_timed_loads(acting.loads).map_err(|error| arm.explained(error))?;
         let (tcp, loads) = (arm.tcp.clone(), scenario.loads.clone());
-        Ok(Self { arm: controller, held, changes: acting.changes, tcp, components: request.components, loads, sags })
+        Ok(Self { arm: controller, fixed, changes: acting.changes, tcp, components: request.components, loads, sags })
     }
 
     fn is_loaded(&self) -> bool {
@@ -353,7 +354,7 @@ impl<'a> AtRest<'a> {
     /// Returns the arm with its payload at a time.
     fn carrying(&self, t: f64) -> Plant {
         let due = self.changes.iter().take_while(|change| change.t <= t);
-        due.fold(self.held.clone(), |plant, change| plant.with_inertia(change.body, change.inertia))
+        due.fold(self.fixed.clone(), |plant, change| plant.with_inertia(change.body, change.inertia))
     }
 
     /// Returns the tool frame of a move on the flexible arm.
@@ -405,8 +406,8 @@ impl<'a> AtRest<'a> {
     fn off(&self, stop: &Stop<'_>, q: &DVector<f64>) -> Result<Vector6<f64>, StepError> {
         let m = self.arm.model.n_actuated();
         let t = stop.rest_s[0];
-        let held = self.carrying(t).along(Arc::new(Held(q.as_slice()[..m].to_vec())));
-        let at = linearise(&held, &self.tool(stop.of), &Wrench::zeros(), t)?;
+        let fixed = self.carrying(t).along(Arc::new(Held(q.as_slice()[..m].to_vec())));
+        let at = linearise(&fixed, &self.tool(stop.of), &Wrench::zeros(), t)?;
         let wanted = self.rigid(stop.of, stop.q);
         let p = at.X_WT.translation.vector - wanted.translation.vector;
         let r = rotation_vector((at.X_WT.rotation * wanted.rotation.inverse()).matrix());

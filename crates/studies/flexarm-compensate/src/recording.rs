@@ -31,7 +31,7 @@ pub(super) fn record(
     let expected = arm.expected(&found.scenario, &run)?;
     for (number, motion) in [&found.scenario.motion, &found.motion].into_iter().enumerate() {
         let scenario = Scenario { motion: motion.clone(), ..found.scenario.clone() };
-        let recorder = Against::new(study.seat(number), wanted.clone(), number == 0);
+        let recorder = Against::new(study.recorder(number), wanted.clone(), number == 0);
         let request = RunRequest {
             recorders: vec![Box::new(recorder)],
             expected: Some(expected),

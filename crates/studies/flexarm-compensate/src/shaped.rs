@@ -170,11 +170,11 @@ impl AtEnd {
         let moving = accelerations.column_iter().rposition(|column| column.amax() > RESTS * accelerations.amax());
         let accelerations = accelerations.columns(0, (moving.unwrap_or(0) + 2).min(count + 1)).into_owned();
         // Servo gains and damping are those of the start, as in a run.
-        let mut held: Plant = start.along(Arc::new(Held(q)));
-        for change in scenario.acting_on(arm.robot(), &held.model)?.changes {
-            held = held.with_inertia(change.body, change.inertia);
+        let mut at_rest: Plant = start.along(Arc::new(Held(q)));
+        for change in scenario.acting_on(arm.robot(), &at_rest.model)?.changes {
+            at_rest = at_rest.with_inertia(change.body, change.inertia);
         }
-        let at = linearise(&held, &arm.tcp, &Wrench::zeros(), 0.0).map_err(|error| arm.explained(error))?;
+        let at = linearise(&at_rest, &arm.tcp, &Wrench::zeros(), 0.0).map_err(|error| arm.explained(error))?;
         let symmetric = (&at.K + at.K.transpose()) * 0.5;
         let modes = damped_modes(&at.M, &at.D, &symmetric).map_err(CompensateError::from)?;
         let swings = |mode: &DampedMode| mode.eigenvalue.im > 0.0 && (0.0..SWINGS).contains(&mode.damping_ratio());

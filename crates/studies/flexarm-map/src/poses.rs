@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use flexarm_files::{NumberTable, TextFileError, read_text};
+use flexarm_files::{NumberTable, read_text};
 use flexarm_kinematics::Model;
-use flexarm_settings::{OutOfRange, Quantity};
+use flexarm_settings::Quantity;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -15,6 +15,9 @@ use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::parsed;
 use flexarm_run::{Error, Finding, Robot};
+
+/// Message about a list without a pose.
+const NO_POSE: &str = "there is no pose: expected a row of joint values";
 
 /// A list of poses as written in TOML.
 #[derive(Debug, Deserialize)]
@@ -51,21 +54,6 @@ pub fn read_poses(path: impl AsRef<Path>, robot: &Robot, at: Option<&[f64]>) -> 
     }
 }
 
-/// Reason why numbers are not a list of poses.
-#[derive(Debug, thiserror::Error)]
-enum PoseListError {
-    #[error(
-        "column {name:?} is not a joint of the robot; its joints are {known:?}; append _deg to the name for degrees"
-    )]
-    UnknownColumn { name: String, known: Vec<String> },
-    #[error("a pose has {found} values, expected {expected}")]
-    Length { found: usize, expected: usize },
-    #[error(transparent)]
-    OutOfRange(#[from] OutOfRange),
-    #[error("there is no pose: expected a row of joint values")]
-    Empty,
-}
-
 /// Data of the robot needed to read a list.
 struct List<'a> {
     /// Names, and whether they are prismatic.
@@ -75,18 +63,16 @@ struct List<'a> {
 
 impl List<'_> {
     fn of_table(&self, path: &Path) -> Result<Vec<Vec<f64>>, Error> {
-        let fail = |what: String| Error::File { path: path.to_owned(), what };
         let table = NumberTable::read(path)?;
         let columns = table.names.iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>();
-        let columns = columns.map_err(|error| fail(error.to_string()))?;
-        let pose = |(row, line): (&Vec<f64>, &usize)| {
-            self.pose(row, &columns).map_err(|error| {
-                let (path, message) = (path.to_owned(), error.to_string());
-                Error::RobotFile(TextFileError { path, line: *line, column: 1, message, page: "map" })
-            })
+        let columns = columns.map_err(|message| table.error(None, message))?;
+        if table.rows.is_empty() {
+            return Err(table.error(None, NO_POSE).into());
+        }
+        let pose = |(k, row): (usize, &Vec<f64>)| {
+            self.pose(row, &columns).map_err(|message| table.error(Some(k), message).into())
         };
-        let poses = table.rows.iter().zip(&table.lines).map(pose).collect::<Result<_, _>>()?;
-        some(poses).map_err(|error| fail(error.to_string()))
+        table.rows.iter().enumerate().map(pose).collect()
     }
 
     fn of_toml(&self, path: &Path) -> Result<Vec<Vec<f64>>, Error> {
@@ -105,46 +91,48 @@ impl List<'_> {
             None => (0..self.joints.len()).map(|k| (k, 1.0)).collect(),
             Some(names) => {
                 let columns = names.get_ref().iter().map(|name| self.column(name)).collect::<Result<Vec<_>, _>>();
-                columns.map_err(|error| source.error(names.span(), error.to_string()))?
+                columns.map_err(|message| source.error(names.span(), message))?
             }
         };
         for (_, factor) in columns.iter_mut().filter(|(k, _)| degrees && !self.joints[*k].1) {
             *factor = 1.0_f64.to_radians();
         }
+        if file.poses.is_empty() {
+            return Err(source.error(0..0, NO_POSE).into());
+        }
         let pose = |row: &Spanned<Vec<f64>>| {
-            self.pose(row.get_ref(), &columns).map_err(|error| source.error(row.span(), error.to_string()))
+            self.pose(row.get_ref(), &columns).map_err(|message| source.error(row.span(), message).into())
         };
-        let poses = file.poses.iter().map(pose).collect::<Result<_, _>>()?;
-        some(poses).map_err(|error| Error::File { path: path.to_owned(), what: error.to_string() })
+        file.poses.iter().map(pose).collect()
     }
 
     /// Returns the index of the joint of a column, and the factor from its unit to rad or m.
-    fn column(&self, name: &str) -> Result<(usize, f64), PoseListError> {
+    fn column(&self, name: &str) -> Result<(usize, f64), String> {
         let joint = |(k, (joint, slides)): (usize, &(&str, bool))| match (name.strip_prefix(joint)?, slides) {
             ("", _) | ("_rad", false) | ("_m", true) => Some((k, 1.0)),
             ("_deg", false) => Some((k, 1.0_f64.to_radians())),
             _ => None,
         };
-        let known = || self.joints.iter().map(|(name, _)| (*name).to_owned()).collect();
-        let unknown = || PoseListError::UnknownColumn { name: name.to_owned(), known: known() };
+        let unknown = || {
+            let known: Vec<&str> = self.joints.iter().map(|(name, _)| *name).collect();
+            format!(
+                "column {name:?} is not a joint of the robot; its joints are {known:?}; append _deg to the name for degrees"
+            )
+        };
         self.joints.iter().enumerate().find_map(joint).ok_or_else(unknown)
     }
 
-    fn pose(&self, row: &[f64], columns: &[(usize, f64)]) -> Result<Vec<f64>, PoseListError> {
+    fn pose(&self, row: &[f64], columns: &[(usize, f64)]) -> Result<Vec<f64>, String> {
         if row.len() != columns.len() {
-            return Err(PoseListError::Length { found: row.len(), expected: columns.len() });
+            return Err(format!("a pose has {} values, expected {}", row.len(), columns.len()));
         }
         let mut pose = self.home.clone();
         for (value, (k, unit)) in row.iter().zip(columns) {
             let name = format!("joint {:?}", self.joints[*k].0);
-            pose[*k] = Quantity::JOINT.check(&name, unit * value)?;
+            pose[*k] = Quantity::JOINT.check(&name, unit * value).map_err(|error| error.to_string())?;
         }
         Ok(pose)
     }
-}
-
-fn some(poses: Vec<Vec<f64>>) -> Result<Vec<Vec<f64>>, PoseListError> {
-    if poses.is_empty() { Err(PoseListError::Empty) } else { Ok(poses) }
 }
 
 /// Checks the poses and returns them as a region.

@@ -3,8 +3,6 @@
 //!
 //! Frames: L link; S section, x from the link's origin to the distal joint, y and z across.
 
-use std::sync::Arc;
-
 use flexarm_kinematics::{Joint, LinkInertia, Pose};
 use flexarm_urdf::{CrossSection, TriangleMesh, cross_section};
 use nalgebra::{Matrix2, Matrix3, Rotation2, Rotation3, Translation3, Vector2, Vector3};
@@ -39,6 +37,9 @@ const ROUND: [f64; 2] = [0.12, 0.06];
 /// Candidate materials, lightest first: name, density (kg/m³), and description.
 const MATERIALS: [(&str, f64, &str); 3] =
     [("aluminium", 2700.0, "aluminium casting"), ("ductile_iron", 7100.0, "cast iron"), ("steel", 7850.0, "steel")];
+
+/// Cause of shapes that are not between the points.
+const FRAMES: &str = "the frames of the file are not along the link";
 
 /// A uniform section with the bending stiffness of the link's outline, hollow such that the link
 /// has its mass.
@@ -99,13 +100,13 @@ pub struct Candidate<'a> {
 /// link's frames, the beam runs along the body given by shape and joint axes.
 pub fn propose(link: &Candidate<'_>) -> Result<BeamSection, NoSection> {
     let reason = match between(link, [Vector3::zeros(), link.distal.X_PJ.translation.vector]) {
-        Err(reason) if reason.is_elsewhere() => reason,
+        Err(reason) if reason.is_elsewhere => reason,
         found => return found,
     };
     let Some(ends) = ends::of(link) else { return Err(reason) };
-    let mut section = between(link, ends).map_err(|own| match own.is_elsewhere() {
+    let mut section = between(link, ends).map_err(|own| match own.is_elsewhere {
         true => reason,
-        false => NoSection::BetweenAxes(Box::new(own)),
+        false => format!("its geometry between the joint axes: {own}").into(),
     })?;
     section.ends = Some(ends.map(|end| (end + Vector3::from(section.offset)).into()));
     section.offset = [0.0; 3];
@@ -114,57 +115,22 @@ pub fn propose(link: &Candidate<'_>) -> Result<BeamSection, NoSection> {
 
 /// Reason why a link has no section.
 #[derive(Clone, Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages say it")]
-pub enum NoSection {
-    #[error("too short: {:.0} mm of the arm's {:.0} mm", 1e3 * .length, 1e3 * .arm)]
-    TooShort { length: f64, arm: f64 },
-    #[error("its mass is unknown")]
-    UnknownMass,
-    #[error("it has no readable geometry")]
-    NoGeometry,
-    #[error("its geometry is flat")]
-    Flat,
-    #[error(
-        "between its frame and joint {joint:?} its geometry covers only {:.0} % of the distance: the frames of the \
-         file are not along the link",
-        100.0 * .along
-    )]
-    Gap { joint: String, along: f64 },
-    #[error(
-        "between its frame and joint {joint:?} its geometry is offset by {:.0} mm: the frames of the file are not \
-         along the link",
-        1e3 * .aside
-    )]
-    Aside { joint: String, aside: f64 },
-    #[error("not slender: {:.0} mm long, {:.0} mm thick", 1e3 * .length, 1e3 * .thickness)]
-    NotSlender { length: f64, thickness: f64 },
-    #[error(
-        "its {mass:.3} kg would be a wall of {:.2} mm of {material} around its outline: the mass does not match the \
-         mesh",
-        1e3 * .wall
-    )]
-    ThinWall { mass: f64, wall: f64, material: &'static str },
-    #[error(
-        "its mass contradicts its mesh: {mass:.2} kg in {:.2} litres, solid steel would have {:.2} kg",
-        1e3 * .volume,
-        7850.0 * .volume
-    )]
-    TooHeavy { mass: f64, volume: f64 },
-    #[error("its width varies by a factor of {taper:.1} between the joints: not a beam")]
-    Tapered { taper: f64 },
-    #[error("only {:.0} % of its mass is between the joints", 100.0 * .own / .whole)]
-    MassElsewhere { own: f64, whole: f64 },
-    #[error("its geometry between the joint axes: {0}")]
-    BetweenAxes(Box<NoSection>),
-    #[error("the beam cannot be used: {0}")]
-    Refused(Arc<flexarm_run::Error>),
+#[error("{message}")]
+pub struct NoSection {
+    message: String,
+    /// Whether the shape may be elsewhere: the points are too close, or there is none between them.
+    is_elsewhere: bool,
 }
 
-impl NoSection {
-    /// Whether the shape may be elsewhere: the points are too close, or there is none between them.
-    fn is_elsewhere(&self) -> bool {
-        matches!(self, Self::TooShort { .. } | Self::Gap { .. } | Self::Aside { .. })
+impl From<String> for NoSection {
+    fn from(message: String) -> Self {
+        Self { message, is_elsewhere: false }
     }
+}
+
+/// Error about points with too little shape between them.
+fn elsewhere(message: String) -> NoSection {
+    NoSection { message, is_elsewhere: true }
 }
 
 /// Returns a section for the part of the link between two points, link axes.
@@ -172,42 +138,52 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
     let axis = to - from;
     let length = axis.norm();
     if length < SHARE * link.arm || length < 1e-3 {
-        return Err(NoSection::TooShort { length, arm: link.arm });
+        let [length, arm] = [length, link.arm].map(|x| 1e3 * x);
+        return Err(elsewhere(format!("too short: {length:.0} mm of the arm's {arm:.0} mm")));
     }
-    let inertia = link.inertia.filter(|i| i.mass > 0.0).ok_or(NoSection::UnknownMass)?;
+    let inertia = link.inertia.filter(|i| i.mass > 0.0).ok_or_else(|| "its mass is unknown".to_owned())?;
     if link.meshes.is_empty() {
-        return Err(NoSection::NoGeometry);
+        return Err("it has no readable geometry".to_owned().into());
     }
+    let joint = &link.distal.name;
     let cuts = Cuts::of(link.meshes, &from, &axis)?;
     let along = cuts.along(length);
     let aside = cuts.centroid(length).norm();
     if along < ALONG {
-        return Err(NoSection::Gap { joint: link.distal.name.clone(), along });
+        return Err(elsewhere(format!(
+            "between its frame and joint {joint:?} its geometry covers only {:.0} % of the distance: {FRAMES}",
+            100.0 * along
+        )));
     }
     if aside > BESIDE * length {
-        return Err(NoSection::Aside { joint: link.distal.name.clone(), aside });
+        return Err(elsewhere(format!(
+            "between its frame and joint {joint:?} its geometry is offset by {:.0} mm: {FRAMES}",
+            1e3 * aside
+        )));
     }
     let shape = if cuts.is_round(length) { Shape::Tube } else { Shape::Box };
     let turn = if shape == Shape::Box { cuts.principal_turn(length) } else { 0.0 };
     let outlines = cuts.outlines(turn, shape);
     let thickness = weighted(&outlines, length, |o| o.width.max(o.height));
     if length < SLENDER * thickness {
-        return Err(NoSection::NotSlender { length, thickness });
+        let [length, thickness] = [length, thickness].map(|x| 1e3 * x);
+        return Err(format!("not slender: {length:.0} mm long, {thickness:.0} mm thick").into());
     }
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
     if let Some(wall) = section.wall.filter(|wall| *wall < THIN * section.width.min(section.height)) {
-        return Err(NoSection::ThinWall { mass: inertia.mass, wall, material });
+        return Err(thin_wall(inertia.mass, wall, material));
     }
     if section.taper > TAPER {
-        return Err(NoSection::Tapered { taper: section.taper });
+        let taper = section.taper;
+        return Err(format!("its width varies by a factor of {taper:.1} between the joints: not a beam").into());
     }
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
     let whole = shell(&outlines, shape, wall);
     let own = shell_between(&outlines, shape, length, wall);
     if own < OWN * whole {
-        return Err(NoSection::MassElsewhere { own, whole });
+        return Err(format!("only {:.0} % of its mass is between the joints", 100.0 * own / whole).into());
     }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
@@ -256,7 +232,7 @@ impl Cuts {
         let places = || meshes.iter().flat_map(|m| &m.positions).map(along);
         let (low, high) = (places().fold(f64::INFINITY, f64::min), places().fold(f64::NEG_INFINITY, f64::max));
         if high - low < 1e-4 {
-            return Err(NoSection::Flat);
+            return Err("its geometry is flat".to_owned().into());
         }
         let step = (high - low) / CUTS as f64;
         let cut = |k: usize| {
@@ -420,11 +396,26 @@ fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, 
     for (name, density, material) in MATERIALS {
         let Some(wall) = wall_for(outlines, shape, mass / density) else { continue };
         if wall < THINNEST {
-            return Err(NoSection::ThinWall { mass, wall, material });
+            return Err(thin_wall(mass, wall, material));
         }
         return Ok((name, wall));
     }
-    Err(NoSection::TooHeavy { mass, volume: shell(outlines, shape, f64::INFINITY) })
+    let volume = shell(outlines, shape, f64::INFINITY);
+    Err(format!(
+        "its mass contradicts its mesh: {mass:.2} kg in {:.2} litres, solid steel would have {:.2} kg",
+        1e3 * volume,
+        7850.0 * volume
+    )
+    .into())
+}
+
+fn thin_wall(mass: f64, wall: f64, material: &str) -> NoSection {
+    format!(
+        "its {mass:.3} kg would be a wall of {:.2} mm of {material} around its outline: the mass does not match the \
+         mesh",
+        1e3 * wall
+    )
+    .into()
 }
 
 /// Second moments of a hollow section about y and z (m⁴).

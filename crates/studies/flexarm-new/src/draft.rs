@@ -366,6 +366,6 @@ fn shapes(urdf: &UrdfRobot, link: &str) -> (Vec<TriangleMesh>, bool) {
             .filter_map(|v| Some(v.geometry.triangles().ok()?.transformed(&v.X_LV)))
             .collect()
     };
-    let seen = read(&urdf.visuals);
-    if seen.is_empty() { (read(&urdf.collisions), true) } else { (seen, false) }
+    let visual = read(&urdf.visuals);
+    if visual.is_empty() { (read(&urdf.collisions), true) } else { (visual, false) }
 }

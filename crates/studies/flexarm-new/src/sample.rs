@@ -73,7 +73,7 @@ struct PoseConditions {
 }
 
 impl PoseConditions {
-    fn holds(&self, pose: &Posed, axes: &[Axis]) -> bool {
+    fn is_met(&self, pose: &Posed, axes: &[Axis]) -> bool {
         let strong = |axis: &Axis| !axis.effort.is_finite() || pose.weight[axis.k] <= WEIGHT * axis.effort;
         pose.lowest >= self.floor && pose.tool.xy().norm() >= self.radius && (!self.torque || axes.iter().all(strong))
     }
@@ -159,13 +159,13 @@ fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: 
             |axis: &Axis| (pose.q[axis.k] - 0.5 * (axis.range[0] + axis.range[1])) / (axis.range[1] - axis.range[0]);
         axes.iter().map(|axis| part(axis).powi(2)).sum()
     };
-    let sound: Vec<&Posed> = poses.iter().filter(|pose| wish.holds(pose, axes)).collect();
+    let sound: Vec<&Posed> = poses.iter().filter(|pose| wish.is_met(pose, axes)).collect();
     let Some(&start) = sound.iter().min_by(|a, b| away(a).total_cmp(&away(b))) else { return Vec::new() };
     let mut rests = vec![start.clone()];
     let turns = turns_in_place(poses);
     let apart = |a: &Posed, b: &Posed| if turns { (&a.q - &b.q).norm() } else { (a.tool - b.tool).norm() };
     let mut way = |a: &Posed, b: &Posed| {
-        (1..8).all(|i| wish.holds(&posed(model, data, a.q.lerp(&b.q, f64::from(i) / 8.0)), axes))
+        (1..8).all(|i| wish.is_met(&posed(model, data, a.q.lerp(&b.q, f64::from(i) / 8.0)), axes))
     };
     while rests.len() <= GOALS {
         let distance = |pose: &Posed| rests.iter().map(|r| apart(r, pose)).fold(f64::INFINITY, f64::min);

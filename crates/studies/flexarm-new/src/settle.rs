@@ -1,12 +1,9 @@
 //! Settles the beams of a draft, and lists its assumptions and the questions that they raise.
 
-use std::sync::Arc;
-
 use flexarm_run::{Description, Error, LoadOptions, RobotSource};
 use flexarm_settings::Setting;
 
 use super::assumption::{Assumption, assumption};
-use super::beams::NoSection;
 use super::draft::{Draft, DraftJoint, DraftLink, placeholders};
 use super::place::Placed;
 use super::text;
@@ -26,7 +23,7 @@ pub(crate) fn settle(draft: &mut Draft, placed: &Placed) -> Result<(), Error> {
             continue;
         }
         if let Err(error) = loads(draft, &[&draft.links[k]]) {
-            draft.links[k].section = Err(NoSection::Refused(Arc::new(error)));
+            draft.links[k].section = Err(format!("the beam cannot be used: {error}").into());
         }
     }
     draft.assumptions = assumptions(draft);

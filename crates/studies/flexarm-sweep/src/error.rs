@@ -3,7 +3,7 @@
 use flexarm_run::ExternalError;
 use std::path::PathBuf;
 
-use flexarm_settings::{Fault, Setting};
+use flexarm_settings::{Fault, Place, Setting};
 
 /// Reason why a study cannot be run, planned or merged.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -46,10 +46,10 @@ pub enum SweepError {
         folder: PathBuf,
     },
     /// A file in the folder of a study is damaged.
-    #[error("{}: {what}", path.display())]
+    #[error("{place}: {what}")]
     Broken {
-        /// Path of the file.
-        path: PathBuf,
+        /// The file, and the line of a journal.
+        place: Place,
         /// Description of the damage and advice.
         what: String,
     },

@@ -454,19 +454,18 @@ fn distribution(
 /// Reads a table of runs: a column for each parameter, named by its path, a row for each run.
 fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEntry>, Error> {
     let table = flexarm_files::NumberTable::read(path)?;
-    let fail = |what: String| Error::File { path: path.to_owned(), what };
     if table.rows.is_empty() {
-        return Err(fail("the table has no rows: expected one for each run".into()));
+        return Err(table.error(None, "the table has no rows: expected one for each run").into());
     }
     let column = |(k, name): (usize, &String)| {
-        let value = |(row, line): (&Vec<f64>, &usize)| match row[k].is_nan() {
+        let value = |(number, row): (usize, &Vec<f64>)| match row[k].is_nan() {
             true => {
                 let message = format!("column {name:?}: the cell is empty, expected a number");
-                Err(RobotFileError { path: path.to_owned(), line: *line, column: 1, message, page: "sweep" }.into())
+                Err(table.error(Some(number), message).into())
             }
             false => Ok(ParameterValue::Number(row[k])),
         };
-        let levels = table.rows.iter().zip(&table.lines).map(value).collect::<Result<Vec<_>, Error>>()?;
+        let levels = table.rows.iter().enumerate().map(value).collect::<Result<Vec<_>, Error>>()?;
         Ok(ParameterEntry {
             name: None,
             paths: vec![name.clone()],

@@ -61,21 +61,9 @@ pub(super) struct Formula {
 
 /// Reason why a text is not a metric or formula.
 #[derive(Debug, thiserror::Error)]
+#[error("{0}")]
 #[doc(hidden)]
-pub enum MetricError {
-    #[error("metric {text:?} has no name: expected name = expression")]
-    NoName { text: String },
-    #[error("metric {text:?}: the name {name:?} is taken: give it another one")]
-    NameTaken { text: String, name: String },
-    #[error("the expression has {bytes} bytes, the maximum is {}", LONGEST)]
-    Long { bytes: usize },
-    #[error("expression {text:?}: {source}")]
-    Syntax { text: String, source: exmex::ExError },
-    #[error("{word} depends on the machine and its load: it cannot be a metric of a study")]
-    OfTheMachine { word: String },
-    #[error("{word:?} {what}; {near}")]
-    NoNumber { word: String, what: &'static str, near: String },
-}
+pub struct MetricError(String);
 
 /// Names that a metric may refer to.
 #[doc(hidden)]
@@ -140,12 +128,12 @@ impl Metric {
             None => (text.trim(), text.trim()),
         };
         if name.is_empty() || name.chars().any(|c| c.is_control()) {
-            return Err(MetricError::NoName { text: text.to_owned() });
+            return Err(MetricError(format!("metric {text:?} has no name: expected name = expression")));
         }
         if known.metrics.iter().any(|other| other.name == name)
             || name != expression && known.parameters.iter().flatten().any(|other| other == name)
         {
-            return Err(MetricError::NameTaken { text: text.to_owned(), name: name.to_owned() });
+            return Err(MetricError(format!("metric {text:?}: the name {name:?} is taken: give it another one")));
         }
         let formula = Formula::parse(expression, known)?;
         let better = formula.better(known).or_else(|| direction::of_name(name));
@@ -230,7 +218,7 @@ pub(super) fn values(metrics: &[Metric], parameters: &[ParameterValue], facts: &
 /// Parses an expression, with a variable in place of each path.
 fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec<Variable>), MetricError> {
     if text.len() > LONGEST {
-        return Err(MetricError::Long { bytes: text.len() });
+        return Err(MetricError(format!("the expression has {} bytes, the maximum is {LONGEST}", text.len())));
     }
     let mut plain = String::new();
     let mut words: Vec<String> = Vec::new();
@@ -247,7 +235,7 @@ fn expression_of(text: &str, known: &Vocabulary<'_>) -> Result<(FlatEx<f64>, Vec
         }
     }
     let variables = words.iter().map(|word| variable(word, known)).collect::<Result<Vec<_>, _>>()?;
-    let fail = |source| MetricError::Syntax { text: text.to_owned(), source };
+    let fail = |source: exmex::ExError| MetricError(format!("expression {text:?}: {source}"));
     let parsed: FlatEx<f64> = exmex::parse(&plain).map_err(fail)?;
     // The parser orders variables by name.
     let place = |name: &String| name.strip_prefix('v').and_then(|number| number.parse::<usize>().ok());
@@ -321,7 +309,8 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, MetricError>
     }
     let path: Vec<String> = word.replace('[', ".").replace(']', "").split('.').map(str::to_owned).collect();
     if path.len() == 1 && OF_THE_MACHINE.contains(&word) {
-        return Err(MetricError::OfTheMachine { word: word.to_owned() });
+        let why = "depends on the machine and its load: it cannot be a metric of a study";
+        return Err(MetricError(format!("{word} {why}")));
     }
     let quick = quick(&path);
     match (quick, find(known.summary, &path)) {
@@ -340,7 +329,7 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, MetricError>
                 leaves(known.summary, "", &mut all);
             }
             all.extend(known.parameters.iter().flatten().cloned());
-            Err(MetricError::NoNumber { word: word.to_owned(), what, near: near(word, &all) })
+            Err(MetricError(format!("{word:?} {what}; {}", near(word, &all))))
         }
     }
 }

@@ -25,29 +25,6 @@ const KEYS: [&str; 15] = [
     "round_corners",
 ];
 
-/// Reason why an option cannot be set.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum OptionError {
-    #[error("there is no option {key:?}; options are {}", KEYS.join(", "))]
-    Unknown { key: String },
-    #[error("options.{key} = {value}: expected {expected}")]
-    Type { key: String, value: ParameterValue, expected: &'static str },
-    #[error("options.{key} = {value}: expected a whole number from {least}")]
-    NotWhole { key: String, value: ParameterValue, least: usize },
-    #[error("options.{key} = {word:?} is not known; use {}", known.join(", "))]
-    Word { key: String, word: String, known: Vec<&'static str> },
-}
-
-impl OptionError {
-    fn of_type(key: &str, value: &ParameterValue, expected: &'static str) -> Self {
-        Self::Type { key: key.to_owned(), value: value.clone(), expected }
-    }
-
-    fn of_word(key: &str, word: &str, known: Vec<&'static str>) -> Self {
-        Self::Word { key: key.to_owned(), word: word.to_owned(), known }
-    }
-}
-
 /// Options of time integration and evaluation of runs.
 #[derive(Clone, Debug)]
 pub(super) struct StudyOptions {
@@ -87,8 +64,8 @@ impl StudyOptions {
     /// Sets an option.
     ///
     /// # Errors
-    /// [`OptionError`] for an unknown option or a value of the wrong type.
-    pub(super) fn set(&mut self, key: &str, value: &ParameterValue) -> Result<(), OptionError> {
+    /// Message for an unknown option or a value of the wrong type.
+    pub(super) fn set(&mut self, key: &str, value: &ParameterValue) -> Result<(), String> {
         match key {
             "step" => self.step_s = Some(number(key, value)?),
             "log_rate" => self.run.log_rate_hz = number(key, value)?,
@@ -102,45 +79,53 @@ impl StudyOptions {
             "dispersion_correction" => self.settings.alpha.dispersion_correction = truth(key, value)?,
             "stepper" => {
                 let word = word(key, value)?;
-                let known = || STEPPERS.iter().map(|entry| entry.name).collect();
-                self.stepper = StepperEntry::named(word).ok_or_else(|| OptionError::of_word(key, word, known()))?;
+                let known = || STEPPERS.iter().map(|entry| entry.name).collect::<Vec<_>>();
+                self.stepper = StepperEntry::named(word).ok_or_else(|| unknown_word(key, word, &known()))?;
             }
             "links" => self.modelling.links = choice(key, value)?,
             "drives" => self.modelling.drives = choice(key, value)?,
             "from_rest" => self.start = choice(key, value)?,
             "reference_method" => self.settings.reference.method = choice(key, value)?,
-            _ => return Err(OptionError::Unknown { key: key.to_owned() }),
+            _ => return Err(format!("there is no option {key:?}; options are {}", KEYS.join(", "))),
         }
         Ok(())
     }
 }
 
-fn number(key: &str, value: &ParameterValue) -> Result<f64, OptionError> {
-    value.number().ok_or_else(|| OptionError::of_type(key, value, "a number"))
+fn number(key: &str, value: &ParameterValue) -> Result<f64, String> {
+    value.number().ok_or_else(|| wrong_type(key, value, "a number"))
 }
 
-fn count(key: &str, value: &ParameterValue, least: usize) -> Result<usize, OptionError> {
+fn count(key: &str, value: &ParameterValue, least: usize) -> Result<usize, String> {
     let whole = value.number().filter(|x| x.fract() == 0.0 && (least as f64..=1e4).contains(x));
-    let fail = || OptionError::NotWhole { key: key.to_owned(), value: value.clone(), least };
+    let fail = || wrong_type(key, value, &format!("a whole number from {least}"));
     whole.map(|x| x as usize).ok_or_else(fail)
 }
 
-fn truth(key: &str, value: &ParameterValue) -> Result<bool, OptionError> {
+fn truth(key: &str, value: &ParameterValue) -> Result<bool, String> {
     match value {
         ParameterValue::Truth(truth) => Ok(*truth),
-        _ => Err(OptionError::of_type(key, value, "true or false")),
+        _ => Err(wrong_type(key, value, "true or false")),
     }
 }
 
-fn word<'a>(key: &str, value: &'a ParameterValue) -> Result<&'a str, OptionError> {
+fn word<'a>(key: &str, value: &'a ParameterValue) -> Result<&'a str, String> {
     match value {
         ParameterValue::Text(word) => Ok(word),
-        _ => Err(OptionError::of_type(key, value, "a string")),
+        _ => Err(wrong_type(key, value, "a string")),
     }
 }
 
 /// Reads a choice by its word.
-fn choice<T: Words>(key: &str, value: &ParameterValue) -> Result<T, OptionError> {
+fn choice<T: Words>(key: &str, value: &ParameterValue) -> Result<T, String> {
     let word = word(key, value)?;
-    T::from_word(word).ok_or_else(|| OptionError::of_word(key, word, T::known()))
+    T::from_word(word).ok_or_else(|| unknown_word(key, word, &T::known()))
+}
+
+fn wrong_type(key: &str, value: &ParameterValue, expected: &str) -> String {
+    format!("options.{key} = {value}: expected {expected}")
+}
+
+fn unknown_word(key: &str, word: &str, known: &[&str]) -> String {
+    format!("options.{key} = {word:?} is not known; use {}", known.join(", "))
 }

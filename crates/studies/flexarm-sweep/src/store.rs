@@ -19,6 +19,7 @@ use std::time::{Duration, Instant};
 
 use flexarm_files::{read_text, write_all};
 use flexarm_log::{CreateOptions, DataColumn, DataTable, DataValues, LogError};
+use flexarm_settings::Place;
 use serde::{Deserialize, Serialize};
 
 use super::design::CAVEATS;
@@ -186,7 +187,7 @@ impl Collected {
     }
 
     fn read_table(&mut self, path: &Path, manifest: &Manifest) -> Result<(), Error> {
-        let broken = |what: String| SweepError::Broken { path: path.to_owned(), what };
+        let broken = |what: String| SweepError::Broken { place: Place::of_file(path.display()), what };
         let table = table::read(path).map_err(|error| match error {
             Error::Log(LogError::NotARecording { found, .. }) => {
                 broken(format!("found {found}: remove the file to repeat its runs")).into()
@@ -289,11 +290,8 @@ fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), 
             break; // truncated while being written
         }
         let broken = || SweepError::Broken {
-            path: path.to_owned(),
-            what: format!(
-                "line {} is not a valid result; remove the line, or remove the file to repeat its runs",
-                answers.len() + 1
-            ),
+            place: Place::of_file(path.display()).line(answers.len() + 1),
+            what: "this is not a valid result; remove the line, or remove the file to repeat its runs".into(),
         };
         let Line(run, reason, metrics, stored) = serde_json::from_slice(line).map_err(|_| broken())?;
         if run >= manifest.runs || reason.is_none() && metrics.len() != manifest.metrics.len() {
@@ -345,7 +343,7 @@ impl Store {
             }
         } else if folder.join(RUNS).exists() || folder.join(PARTS).exists() {
             let what = "exists without study.json: choose another folder".into();
-            return Err(SweepError::Broken { path: folder.join(RUNS), what }.into());
+            return Err(SweepError::Broken { place: Place::of_file(folder.join(RUNS).display()), what }.into());
         }
         let parts = folder.join(PARTS);
         std::fs::create_dir_all(&parts).map_err(write(&parts))?;
@@ -433,7 +431,7 @@ pub(super) fn known_manifest(folder: &Path) -> Result<Option<Manifest>, Error> {
     if !path.exists() {
         return Ok(None);
     }
-    let broken = |what: String| SweepError::Broken { path: path.clone(), what };
+    let broken = |what: String| SweepError::Broken { place: Place::of_file(path.display()), what };
     let manifest: Manifest = serde_json::from_str(&read_text(&path)?)
         .map_err(|error| broken(format!("is not a valid study ({error}): remove the folder, or choose another one")))?;
     if manifest.format != 1 {

@@ -1,8 +1,6 @@
 //! Targets of a parameter's path: the robot file, the motion, the loads, an option, or the job of a
 //! reduced link.
 
-use std::path::PathBuf;
-
 use super::file::Role;
 use super::path::{Segment, ValueLocation, changed, leaves, near, places, segments, written};
 use super::value::ParameterValue;
@@ -33,38 +31,18 @@ pub(super) enum Target {
     Entry(TargetFile, Vec<Segment>),
 }
 
-/// Reason why a path of a parameter has no target, or why a value cannot be put there.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum TargetError {
-    #[error("{path:?} is not a path: expected names separated by dots, such as drive.joint_2.gearbox.stiffness")]
-    NoPath { path: String },
-    #[error("{path:?}: an option has one name, such as options.step")]
-    LongOption { path: String },
-    #[error("{path:?}: the study names no job for link {link:?}; add {link} = \"job.toml\" to [reduce]")]
-    NoJob { path: String, link: String },
-    #[error("{path:?}: the study names no file of this kind")]
-    NoFile { path: String },
-    #[error("{path:?}: {} is not a TOML file and has no keys", file.display())]
-    NoToml { path: String, file: PathBuf },
-    #[error("{path:?} matches no entry; {near}")]
-    NoMatch { path: String, near: String },
-    #[error("{path:?}: {name} is not a number: a factor or offset does not apply")]
-    NoNumber { path: String, name: String },
-    #[error("{path:?}: {name} is not in the file: a factor or offset needs an existing number")]
-    NotInFile { path: String, name: String },
-    #[error("{path:?}: factor or offset {value:?} must be a number")]
-    NoFactor { path: String, value: ParameterValue },
-}
-
 impl Target {
     /// Parses a path.
     ///
     /// * `jobs`: names of the links with a job.
     ///
     /// # Errors
-    /// [`TargetError`] for an invalid path.
-    pub(super) fn parse(path: &str, jobs: &[String]) -> Result<Self, TargetError> {
-        let all = segments(path).ok_or_else(|| TargetError::NoPath { path: path.to_owned() })?;
+    /// Message for an invalid path.
+    pub(super) fn parse(path: &str, jobs: &[String]) -> Result<Self, String> {
+        let all = segments(path).ok_or_else(|| {
+            let example = "drive.joint_2.gearbox.stiffness";
+            format!("{path:?} is not a path: expected names separated by dots, such as {example}")
+        })?;
         let word = |k: usize| match all.get(k) {
             Some(Segment::Key(key)) => key.as_str(),
             _ => "",
@@ -75,12 +53,17 @@ impl Target {
             ("loads", 1) => Ok(Self::File(TargetFile::Loads)),
             ("motion", 2) if word(1) == "speed" => Ok(Self::Speed),
             ("options", 2) => Ok(Self::Option(word(1).to_owned())),
-            ("options", _) => Err(TargetError::LongOption { path: path.to_owned() }),
+            ("options", _) => Err(format!("{path:?}: an option has one name, such as options.step")),
             ("motion", _) => Ok(Self::Entry(TargetFile::Motion, all[1..].to_vec())),
             ("loads", _) => Ok(Self::Entry(TargetFile::Loads, all[1..].to_vec())),
             ("reduce", 3..) => match jobs.iter().position(|link| link == word(1)) {
                 Some(job) => Ok(Self::Entry(TargetFile::Job(job), all[2..].to_vec())),
-                None => Err(TargetError::NoJob { path: path.to_owned(), link: word(1).to_owned() }),
+                None => {
+                    let link = word(1);
+                    Err(format!(
+                        "{path:?}: the study names no job for link {link:?}; add {link} = \"job.toml\" to [reduce]"
+                    ))
+                }
             },
             ("robot", _) => Ok(Self::Entry(TargetFile::Robot, of_robot(all[1..].to_vec()))),
             _ => Ok(Self::Entry(TargetFile::Robot, of_robot(all))),
@@ -111,7 +94,7 @@ pub(super) struct Edit {
 /// * `known`: earlier edits, to which a factor or an offset is applied.
 ///
 /// # Errors
-/// [`TargetError`] for a path without a match, and for a factor or an offset of a value that is not
+/// Message for a path without a match, and for a factor or an offset of a value that is not
 /// numeric.
 pub(super) fn edits(
     root: &toml::Value,
@@ -120,11 +103,10 @@ pub(super) fn edits(
     role: Role,
     value: &ParameterValue,
     known: &[Edit],
-) -> Result<Vec<Edit>, TargetError> {
+) -> Result<Vec<Edit>, String> {
     let found = places(root, path);
-    let text = || text.to_owned();
     if found.is_empty() {
-        return Err(TargetError::NoMatch { near: near(&text(), &leaves(root)), path: text() });
+        return Err(format!("{text:?} matches no entry; {}", near(text, &leaves(root))));
     }
     let edit = |place: ValueLocation| {
         let before = known.iter().rev().find(|edit| edit.place == place).and_then(|edit| plain(&edit.value));
@@ -133,10 +115,15 @@ pub(super) fn edits(
             (Role::Value, ..) => written(value, old),
             (_, Some(x), Some(old)) => {
                 let change: &dyn Fn(f64) -> f64 = if role == Role::Factor { &move |y| y * x } else { &move |y| y + x };
-                changed(old, change).ok_or_else(|| TargetError::NoNumber { path: text(), name: place.name.clone() })?
+                changed(old, change).ok_or_else(|| {
+                    format!("{text:?}: {} is not a number: a factor or offset does not apply", place.name)
+                })?
             }
-            (_, Some(_), None) => return Err(TargetError::NotInFile { path: text(), name: place.name }),
-            (_, None, _) => return Err(TargetError::NoFactor { path: text(), value: value.clone() }),
+            (_, Some(_), None) => {
+                let needs = "a factor or offset needs an existing number";
+                return Err(format!("{text:?}: {} is not in the file: {needs}", place.name));
+            }
+            (_, None, _) => return Err(format!("{text:?}: factor or offset {value:?} must be a number")),
         };
         Ok(Edit { place, value })
     };

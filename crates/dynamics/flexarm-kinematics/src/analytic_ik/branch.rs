@@ -140,7 +140,7 @@ const BOUNDARY: f64 = 1e-4;
 /// Reference directions for the sides, at zero joint values.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sides {
-    /// Unit vector normal to axes 1 and 2, pointing to the front.
+    /// Unit vector normal to axes 1 and 2, pointing to the front, in world axes.
     front: Vector3<f64>,
     /// Whether a positive rotation of joint 3 bends the forearm forward and down when the upper arm
     /// is upright.
@@ -150,7 +150,10 @@ pub(crate) struct Sides {
 }
 
 impl Sides {
-    pub(crate) fn new(kernel: &Kernel, reversed: bool, against_gravity: Vector3<f64>) -> Self {
+    /// Chooses the sides of an arm.
+    ///
+    /// * `up_W`: direction against gravity, in world axes, any length.
+    pub(crate) fn new(kernel: &Kernel, reversed: bool, up_W: Vector3<f64>) -> Self {
         let (axes, fan, reach) = match kernel {
             Kernel::Wrist(k) => (&k.axes, Some(k.fan), k.reach),
             Kernel::Parallel234(k) => (&k.axes, Some(k.fan), k.reach),
@@ -170,7 +173,7 @@ impl Sides {
         sides.front = front * first(&[front.dot(&(shoulder - foot)), front.dot(&center)]);
         let up = axes[0].h;
         let height = if reversed { 0.0 } else { up.dot(&foot) };
-        let up = up * first(&[height, up.dot(&against_gravity)]);
+        let up = up * first(&[height, up.dot(&up_W)]);
         sides.elbow_forward = axes[2].h.dot(&up.cross(&sides.front)) > 0.0;
         sides
     }

@@ -47,8 +47,8 @@ fn sixth_angles(
     let mut angles = List::new((0.0, Kind::Single { free }));
     if size < STRAIGHT {
         let near = [0, 1, -1, 2, -2, 3, -3, 4].map(|k| hint + FRAC_PI_4 * f64::from(k));
-        let held = near.into_iter().find(|q6| reaches(*q6)).unwrap_or(hint);
-        angles.push((held, Kind::Representative { group }));
+        let reachable = near.into_iter().find(|q6| reaches(*q6)).unwrap_or(hint);
+        angles.push((reachable, Kind::Representative { group }));
         angles.push((angle, Kind::Member { group }));
     } else {
         angles.push((angle, Kind::Single { free }));

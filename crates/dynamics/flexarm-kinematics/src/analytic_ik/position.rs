@@ -172,17 +172,19 @@ pub(crate) struct TwoAngles {
 }
 
 /// Solves `E_a E_b c = p` in the plane normal to two parallel axes: both elbow configurations.
+///
+/// * `c_W`: point that the second axis carries, at zero angles; `p_W`: its target (m, world axes).
 pub(crate) fn two_bars(
     first: &Screw,
     second: &Screw,
-    c: &Vector3<f64>,
-    p: &Vector3<f64>,
+    c_W: &Vector3<f64>,
+    p_W: &Vector3<f64>,
     hint: [f64; 2],
     reach: f64,
 ) -> List<TwoAngles, 2> {
     let mut found = List::new(TwoAngles { q: [0.0; 2], free: false });
     let flat = |v: Vector3<f64>| v - first.h * first.h.dot(&v);
-    let (d, v, p) = (flat(second.o - first.o), flat(c - second.o), flat(p - first.o));
+    let (d, v, p) = (flat(second.o - first.o), flat(c_W - second.o), flat(p_W - first.o));
     let (k, a, b) = dot_turned(&d, &second.h, &v);
     let distance = 0.5 * (p.norm_squared() - d.norm_squared() - v.norm_squared());
     let roots = linear(a, b, distance - k, ROUNDING * reach * reach, hint[1]);
@@ -195,10 +197,10 @@ pub(crate) fn two_bars(
     found
 }
 
-/// Whether two bars can reach a point, see [`two_bars`].
-pub(crate) fn bars_reach(first: &Screw, second: &Screw, c: &Vector3<f64>, p: &Vector3<f64>) -> bool {
+/// Whether two bars can reach a point; `c_W` and `p_W` as in [`two_bars`].
+pub(crate) fn bars_reach(first: &Screw, second: &Screw, c_W: &Vector3<f64>, p_W: &Vector3<f64>) -> bool {
     let length = |v: Vector3<f64>| first.h.cross(&v).norm();
-    let (d, v, p) = (length(second.o - first.o), length(c - second.o), length(p - first.o));
+    let (d, v, p) = (length(second.o - first.o), length(c_W - second.o), length(p_W - first.o));
     (d - v).abs() <= p && p <= d + v
 }
 

@@ -147,9 +147,9 @@ impl AnalyticArm {
     pub fn new(model: &Model, frame: &Frame) -> Result<Self, NoAnalyticIk> {
         check_open(model, frame)?;
         let joints = moving_joints(model, frame);
-        let held = DVector::zeros(model.nv());
+        let others = DVector::zeros(model.nv());
         match joints.as_slice().try_into() {
-            Ok(joints) => Self::with_joints(model, frame, joints, &held),
+            Ok(joints) => Self::with_joints(model, frame, joints, &others),
             Err(_) => {
                 let names = joints.iter().map(|&k| model.coordinates()[k].joint.clone()).collect();
                 Err(NoAnalyticIk::JointCount { frame: frame.name.clone(), joints: names })

@@ -34,8 +34,8 @@ impl Screw {
     }
 
     /// Distance of a point from the line (m).
-    pub(crate) fn distance(&self, p: &Vector3<f64>) -> f64 {
-        self.h.cross(&(p - self.o)).norm()
+    pub(crate) fn distance(&self, p_W: &Vector3<f64>) -> f64 {
+        self.h.cross(&(p_W - self.o)).norm()
     }
 }
 
@@ -44,15 +44,15 @@ impl Turn<'_> {
         Self { sine: -self.sine, ..self }
     }
 
-    /// `R v`.
-    pub(crate) fn vector(&self, v: &Vector3<f64>) -> Vector3<f64> {
+    /// Turned direction `R v`, in world axes.
+    pub(crate) fn vector(&self, v_W: &Vector3<f64>) -> Vector3<f64> {
         let h = &self.screw.h;
-        v * self.cosine + h.cross(v) * self.sine + h * (h.dot(v) * (1.0 - self.cosine))
+        v_W * self.cosine + h.cross(v_W) * self.sine + h * (h.dot(v_W) * (1.0 - self.cosine))
     }
 
-    /// `o + R (p - o)`.
-    pub(crate) fn point(&self, p: &Vector3<f64>) -> Vector3<f64> {
-        self.screw.o + self.vector(&(p - self.screw.o))
+    /// Moved point `o + R (p - o)`, in world axes.
+    pub(crate) fn point(&self, p_W: &Vector3<f64>) -> Vector3<f64> {
+        self.screw.o + self.vector(&(p_W - self.screw.o))
     }
 }
 

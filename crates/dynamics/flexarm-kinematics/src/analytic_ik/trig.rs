@@ -83,20 +83,21 @@ pub(crate) fn linear(a: f64, b: f64, c: f64, floor: f64, hint: f64) -> Roots {
     Roots::two(b.atan2(a), half)
 }
 
-/// Coefficients `(k, a, b)` of `u · R(h, t) v = k + a cos t + b sin t`.
+/// Coefficients `(k, a, b)` of `u · R(h, t) v = k + a cos t + b sin t`; `u`, the unit axis `h` and
+/// `v` in the same axes.
 pub(crate) fn dot_turned(u: &Vector3<f64>, h: &Vector3<f64>, v: &Vector3<f64>) -> (f64, f64, f64) {
     let k = u.dot(h) * h.dot(v);
     (k, u.dot(v) - k, u.dot(&h.cross(v)))
 }
 
-/// Angle about `h` that rotates the component of `a` normal to `h` onto that of `b`, and the
+/// Angle about the unit axis `h`, in the axes of `a` and `b`, that rotates the component of `a` normal to `h` onto that of `b`, and the
 /// smaller of the lengths of these components.
 pub(crate) fn angle_about(h: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> (f64, f64) {
     let (a, b) = (a - h * h.dot(a), b - h * h.dot(b));
     (h.dot(&a.cross(&b)).atan2(a.dot(&b)), a.norm().min(b.norm()))
 }
 
-/// Unit vector normal to `h`.
+/// Unit vector normal to `h`, in its axes.
 pub(crate) fn across(h: &Vector3<f64>) -> Vector3<f64> {
     let e = Vector3::ith(h.iamin(), 1.0);
     (e - h * h.dot(&e)).normalize()
@@ -117,13 +118,13 @@ pub struct Fan {
 }
 
 impl Fan {
-    /// Prepares the equation for u, the axis h, and w.
+    /// Prepares the equation for u, the unit axis h and w, in the same axes.
     pub fn new(u: &Vector3<f64>, h: &Vector3<f64>, w: &Vector3<f64>) -> Self {
         let (a, cosine, sine) = dot_turned(u, h, w);
         Self { phi: sine.atan2(cosine), a, b: cosine.hypot(sine) }
     }
 
-    /// The angles t for `v`.
+    /// The angles t for `v`, in the axes of `u`.
     pub fn angles(&self, u: &Vector3<f64>, v: &Vector3<f64>) -> Roots {
         const UNIT: f64 = 1e-14;
         let cosine = u.dot(v);

@@ -10,7 +10,7 @@ use crate::model::{Body, Frame, JointMotion, ModelError};
 /// Places the balancers of a mechanism on its bodies.
 ///
 /// # Errors
-/// [`ModelError::Duplicate`], [`ModelError::UnknownLink`] and [`ModelError::BadBalancer`].
+/// [`ModelError`] with the name of the balancer.
 pub(crate) fn place_balancers(
     mechanism: &Mechanism,
     frames: &[Frame],
@@ -21,13 +21,13 @@ pub(crate) fn place_balancers(
     let mut placed = Vec::new();
     for Balancer { name, span, law } in &mechanism.balancers {
         if !names.insert(name) {
-            return Err(ModelError::Duplicate { what: "balancer", name: name.clone() });
+            return Err(ModelError::duplicate("balancer", name));
         }
         if !law.is_finite() {
-            return Err(ModelError::NotFinite { what: "law of balancer", name: name.clone() });
+            return Err(ModelError::not_finite("law of balancer", name));
         }
         // Ends of the balancer: two points on bodies, or the sum of the coordinates over its joint.
-        let fail = |what: &'static str| ModelError::BadBalancer { balancer: name.clone(), what };
+        let fail = |what: &str| ModelError::Structure(format!("balancer {name:?}: {what} is not in the robot"));
         let frame =
             |link: &String, what: &'static str| frames.iter().find(|f| f.name == *link).ok_or_else(|| fail(what));
         let place = match span {

@@ -29,7 +29,7 @@ pub(super) fn bad(closure: &LoopClosure, what: impl Into<String>) -> ModelError 
 /// Loops of a mechanism, ordered so that each depends only on loops before it.
 ///
 /// # Errors
-/// [`ModelError::BadLoop`], [`ModelError::Duplicate`].
+/// [`ModelError`] with the name of the loop.
 pub(crate) fn draft_loops<'m>(
     mechanism: &'m Mechanism,
     frames: &[Frame],
@@ -38,7 +38,7 @@ pub(crate) fn draft_loops<'m>(
     let mut drafts: Vec<LoopDraft<'m>> = Vec::new();
     for closure in &mechanism.loops {
         if drafts.iter().any(|other| other.closure.name == closure.name) {
-            return Err(ModelError::Duplicate { what: "loop", name: closure.name.clone() });
+            return Err(ModelError::duplicate("loop", &closure.name));
         }
         // A joint follows from one loop only.
         let draft = LoopDraft::new(closure, mechanism, frames, bodies)?;
@@ -86,7 +86,7 @@ impl<'m> LoopDraft<'m> {
         let (pin, eye) = (frame(&closure.pin)?, frame(&closure.eye)?);
         let finite = closure.axis.iter().chain(closure.at.iter().map(|(_, x)| x)).all(|x| x.is_finite());
         if !finite {
-            return Err(ModelError::NotFinite { what: "axis or start value of loop", name: closure.name.clone() });
+            return Err(ModelError::not_finite("axis or start value of loop", &closure.name));
         }
         let path = |body: usize| {
             let mut path = vec![body];

@@ -1,4 +1,7 @@
 //! Geometry of a loop at given joint poses: its gap, Jacobian, triangle and transmission angle.
+//!
+//! `X_C[i]` is the pose of body i in the common body C of the loop; vectors are in axes of C, but
+//! two-vectors in the plane of the pin A.
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -13,37 +16,37 @@ use crate::model::{Body, JointMotion, Model};
 
 impl PlacedLoop {
     /// Poses of the loop's bodies in the common body.
-    pub(super) fn place_chains(&self, model: &Model, data: &Data, X: &mut [Pose]) {
-        X[self.common] = Pose::identity();
+    pub(super) fn place_chains(&self, model: &Model, data: &Data, X_C: &mut [Pose]) {
+        X_C[self.common] = Pose::identity();
         for &i in self.chains.iter().flatten() {
-            X[i] = X[model.bodies[i].parent] * data.X_PB[i];
+            X_C[i] = X_C[model.bodies[i].parent] * data.X_PB[i];
         }
     }
 
     /// Pose of the pin and position of the eye in the common body.
-    pub(super) fn ends_at(&self, X: &[Pose]) -> (Pose, Vector3<f64>) {
-        let eye = &X[self.ends[1]];
-        (X[self.ends[0]] * self.X_pin, eye.rotation * self.p_eye + eye.translation.vector)
+    pub(super) fn ends_at(&self, X_C: &[Pose]) -> (Pose, Vector3<f64>) {
+        let eye = &X_C[self.ends[1]];
+        (X_C[self.ends[0]] * self.X_pin, eye.rotation * self.p_eye + eye.translation.vector)
     }
 
     /// Residual of (1) (m), and the size of the loop (m).
-    pub(super) fn gap(&self, X: &[Pose]) -> (Vector2<f64>, f64) {
-        let (A, p_B) = self.ends_at(X);
+    pub(super) fn gap(&self, X_C: &[Pose]) -> (Vector2<f64>, f64) {
+        let (A, p_B) = self.ends_at(X_C);
         let p = A.rotation.inverse() * (p_B - A.translation.vector);
-        let size = self.chains.iter().flatten().map(|&i| X[i].translation.vector.amax());
+        let size = self.chains.iter().flatten().map(|&i| X_C[i].translation.vector.amax());
         (p.xy(), size.chain([p_B.amax(), A.translation.vector.amax()]).fold(0.0, f64::max))
     }
 
     /// `∂c/∂q`, two rows per coordinate of the tree; zero for coordinates that do not move the
     /// loop.
-    pub(super) fn jacobian(&self, model: &Model, data: &Data, X: &[Pose], J: &mut [Vector2<f64>]) {
+    pub(super) fn jacobian(&self, model: &Model, data: &Data, X_C: &[Pose], J: &mut [Vector2<f64>]) {
         J.fill(Vector2::zeros());
-        let (A, p_B) = self.ends_at(X);
+        let (A, p_B) = self.ends_at(X_C);
         let R_A = A.rotation.inverse();
         for (chain, sign) in self.chains.iter().zip([-1.0, 1.0]) {
             for &i in chain {
-                let r = p_B - X[i].translation.vector;
-                joint_columns(model, data, i, X[i].rotation.matrix(), |k, l, a| {
+                let r = p_B - X_C[i].translation.vector;
+                joint_columns(model, data, i, X_C[i].rotation.matrix(), |k, l, a| {
                     J[k] += (R_A * (l + a.cross(&r))).xy() * sign;
                 });
             }
@@ -51,17 +54,17 @@ impl PlacedLoop {
     }
 
     /// The loop as a triangle in the plane normal to the pin, at the joint poses in `X`.
-    pub(super) fn triangle(&self, model: &Model, X: &[Pose]) -> Triangle {
-        let (A, p_B) = self.ends_at(X);
+    pub(super) fn triangle(&self, model: &Model, X_C: &[Pose]) -> Triangle {
+        let (A, p_B) = self.ends_at(X_C);
         let R = A.rotation.inverse();
         let flat = |p: &Vector3<f64>| (R * (p - A.translation.vector)).xy();
         let joint = |which: usize| {
             let body = self.dependent[which];
             let axis = model.bodies[body].motion_axis();
-            let axis_A = R * (X[body].rotation * axis);
+            let axis_A = R * (X_C[body].rotation * axis);
             let slides = model.bodies[body].slides();
             let way = if slides { axis_A.xy() } else { Vector2::new(axis_A.z.signum(), 0.0) };
-            FlatJoint { slides, at: flat(&X[body].translation.vector), way }
+            FlatJoint { slides, at: flat(&X_C[body].translation.vector), way }
         };
         let (p_A, p_B) = (Vector2::zeros(), flat(&p_B));
         Triangle { joints: [joint(0), joint(1)], ends: [p_A, p_B], shape: self.shape }
@@ -70,12 +73,12 @@ impl PlacedLoop {
     /// Transmission angle (rad), 90 degrees at best: the angle between the two triangle sides
     /// without driving joints. With a sliding dependent joint it is the angle between the two
     /// directions in which the dependent joints move the pin.
-    pub(super) fn transmission(&self, model: &Model, X: &[Pose], J: &[Vector2<f64>]) -> f64 {
+    pub(super) fn transmission(&self, model: &Model, X_C: &[Pose], J: &[Vector2<f64>]) -> f64 {
         let between = |a: Vector2<f64>, b: Vector2<f64>| (a.x * b.y - a.y * b.x).abs().atan2(a.dot(&b).abs());
         if self.dependent.iter().any(|&body| model.bodies[body].slides()) {
             return between(J[self.first], J[self.first + 1]);
         }
-        let Triangle { joints, ends, .. } = self.triangle(model, X);
+        let Triangle { joints, ends, .. } = self.triangle(model, X_C);
         let corners = [joints[0].at, joints[1].at, ends[1]];
         let angle = |k: usize| {
             let [a, b] = [1, 2].map(|step| corners[(k + step) % 3] - corners[k]);

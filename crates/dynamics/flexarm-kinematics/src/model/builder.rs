@@ -106,11 +106,11 @@ impl<'a> Builder<'a> {
         self.frames.push(Frame { name: link.name.clone(), body, X_BF: X_BL });
         if let Some((_, shapes)) = self.mechanism.modal.iter().find(|(name, _)| *name == link.name) {
             if let Some(what) = shapes.fault() {
-                return Err(ModelError::BadModal { link: link.name.clone(), what });
+                return Err(ModelError::modal(&link.name, what));
             }
             if self.bodies[body].modal.is_some() || X_BL != Pose::identity() {
                 let what = "its position in a body that is modal already";
-                return Err(ModelError::BadModal { link: link.name.clone(), what });
+                return Err(ModelError::modal(&link.name, what));
             }
             self.bodies[body].modal = Some(self.modal.len());
             let tables = ModalTables::new(shapes);
@@ -123,7 +123,7 @@ impl<'a> Builder<'a> {
     /// child link in it.
     fn cross(&mut self, joint: &Joint, parent: usize, body: usize, X_BL: &Pose) -> Result<(usize, Pose), ModelError> {
         if !joint.X_PJ.translation.vector.iter().chain(joint.X_PJ.rotation.matrix().iter()).all(|x| x.is_finite()) {
-            return Err(ModelError::NotFinite { what: "origin", name: joint.name.clone() });
+            return Err(ModelError::not_finite("origin", &joint.name));
         }
         let of_joint = |what| out_of_range("joint", &joint.name, what);
         Quantity::LENGTH.check_all("origin", &joint.X_PJ.translation.vector).map_err(of_joint)?;
@@ -144,7 +144,7 @@ impl<'a> Builder<'a> {
                 }
                 _ => {
                     let what = "an interface joint on it that its modal body does not have";
-                    return Err(ModelError::BadModal { link: link.name.clone(), what });
+                    return Err(ModelError::modal(&link.name, what));
                 }
             },
             _ => return Ok((body, X_BJ)),
@@ -192,7 +192,11 @@ impl<'a> Builder<'a> {
             let body = &self.bodies[i];
             let mass = carried[i];
             if mass.is_nan() || mass < 0.0 || (mass == 0.0 && body.elastic) {
-                return Err(ModelError::NoMass { link: body.name.clone(), joint: body.joint.clone(), mass });
+                let (link, joint) = (&body.name, &body.joint);
+                return Err(ModelError::Value(format!(
+                    "link {link:?} is elastic (joint {joint:?}) and has mass {mass} kg with all that it carries: give \
+                     it a positive mass, or keep everything before it rigid"
+                )));
             }
             carried[body.parent] += mass;
         }
@@ -206,7 +210,11 @@ impl<'a> Builder<'a> {
         let followers: Vec<usize> = drafts.iter().flat_map(LoopDraft::dependent).collect();
         let Numbering { coordinates, elastic, n_actuated } = self.number(&followers);
         if coordinates.len() > MAX_COORDINATES {
-            return Err(ModelError::TooManyCoordinates { found: coordinates.len() });
+            return Err(ModelError::Value(format!(
+                "the model has {} coordinates (joints, springs and modes together), at most {MAX_COORDINATES} are \
+                 taken: memory grows with their square and the time of a step with their cube",
+                coordinates.len()
+            )));
         }
         self.share(&coordinates[..n_actuated])?;
         let dependent = self.number_dependent(&followers, coordinates.len());
@@ -252,16 +260,20 @@ impl<'a> Builder<'a> {
 
     /// Coordinates coupled by rotors, with the coupling inertia.
     fn rotor_couplings(&self) -> Result<Vec<(usize, usize, f64)>, ModelError> {
+        let bad = |joint: &str| {
+            let needs = "it needs two joints of one coordinate each, and a finite inertia";
+            ModelError::Structure(format!("the rotor between joint {joint:?} and another one: {needs}"))
+        };
         let coordinate = |joint: &String| {
             let own = |b: &&Body| b.joint == *joint && matches!(b.motion, JointMotion::Axis(_)) && b.ratio == 1.0;
             let body = self.bodies[1..].iter().find(own);
-            body.map(|b| b.coordinate).ok_or_else(|| ModelError::BadRotor { joint: joint.clone() })
+            body.map(|b| b.coordinate).ok_or_else(|| bad(joint))
         };
         let placed = |coupling: &RotorCoupling| {
             let [first, second] = &coupling.joints;
             let (a, b) = (coordinate(first)?, coordinate(second)?);
             if a == b || !coupling.inertia.is_finite() {
-                return Err(ModelError::BadRotor { joint: second.clone() });
+                return Err(bad(second));
             }
             Ok((a, b, coupling.inertia))
         };

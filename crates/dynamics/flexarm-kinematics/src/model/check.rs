@@ -1,6 +1,6 @@
 //! Checks of a mechanism: names, parents, connectivity, and inertias.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use flexarm_settings::{OutOfRange, Quantity};
 
@@ -10,30 +10,33 @@ use crate::model::error::ModelError;
 /// Checks names, parents and connectivity; returns the index of the base link.
 pub(super) fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
     if mechanism.links.is_empty() {
-        return Err(ModelError::NoLinks(mechanism.name.clone()));
+        return Err(ModelError::Structure(format!(
+            "mechanism {:?} has no links: add at least a base link",
+            mechanism.name
+        )));
     }
     let mut parent_of: HashMap<&str, Option<&str>> = HashMap::new();
     for link in &mechanism.links {
         if parent_of.insert(&link.name, None).is_some() {
-            return Err(ModelError::Duplicate { what: "link", name: link.name.clone() });
+            return Err(ModelError::duplicate("link", &link.name));
         }
     }
-    let mut seen = HashMap::new();
+    let mut names = HashSet::new();
     for joint in &mechanism.joints {
-        if seen.insert(joint.name.as_str(), ()).is_some() {
-            return Err(ModelError::Duplicate { what: "joint", name: joint.name.clone() });
+        if !names.insert(joint.name.as_str()) {
+            return Err(ModelError::duplicate("joint", &joint.name));
         }
         for link in [&joint.parent, &joint.child] {
             if !parent_of.contains_key(link.as_str()) {
-                return Err(ModelError::UnknownLink { joint: joint.name.clone(), link: link.clone() });
+                let message = format!("joint {:?} refers to link {link:?}, which does not exist", joint.name);
+                return Err(ModelError::Structure(message));
             }
         }
         if let Some(first) = parent_of.insert(&joint.child, Some(&joint.name)).flatten() {
-            return Err(ModelError::TwoParents {
-                link: joint.child.clone(),
-                first: first.to_owned(),
-                second: joint.name.clone(),
-            });
+            let (link, second) = (&joint.child, &joint.name);
+            return Err(ModelError::Structure(format!(
+                "link {link:?} is the child of both joint {first:?} and joint {second:?}: a tree has one parent each"
+            )));
         }
     }
 
@@ -47,14 +50,17 @@ pub(super) fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
         reached.insert(link, ());
         open.extend(children.get(link).into_iter().flatten().map(|j| j.child.as_str()));
     }
-    let looped: Vec<String> =
-        mechanism.links.iter().filter(|l| !reached.contains_key(l.name.as_str())).map(|l| l.name.clone()).collect();
+    let names = mechanism.links.iter().map(|link| link.name.as_str());
+    let looped: Vec<&str> = names.filter(|name| !reached.contains_key(name)).collect();
     if !looped.is_empty() {
-        return Err(ModelError::Cycle { links: looped });
+        return Err(ModelError::Structure(format!("links {looped:?} form a loop: open it at one joint")));
     }
     if roots.len() > 1 {
-        let roots = roots.iter().map(|&i| mechanism.links[i].name.clone()).collect();
-        return Err(ModelError::Disconnected { roots });
+        let bases: Vec<&String> = roots.iter().map(|&i| &mechanism.links[i].name).collect();
+        return Err(ModelError::Structure(format!(
+            "the links form {} separate parts with bases {bases:?}: connect them by joints",
+            bases.len()
+        )));
     }
     Ok(roots[0])
 }
@@ -83,7 +89,7 @@ pub fn moment_floor(mass: f64, largest: f64) -> f64 {
 }
 
 pub(super) fn out_of_range(part: &'static str, name: &str, what: OutOfRange) -> ModelError {
-    ModelError::OutOfRange { part, name: name.to_owned(), what }
+    ModelError::Value(format!("{part} {name:?}: {what}"))
 }
 
 /// Checks that the inertia is finite and physically possible. The inertia of fixed links has no
@@ -92,13 +98,15 @@ pub(super) fn check_inertia(link: &str, inertia: &LinkInertia, moves: bool) -> R
     let finite =
         inertia.mass.is_finite() && inertia.com.iter().chain(inertia.inertia_com.iter()).all(|x| x.is_finite());
     if !finite {
-        return Err(ModelError::NotFinite { what: "inertia", name: link.to_owned() });
+        return Err(ModelError::not_finite("inertia", link));
     }
     if !moves {
         return Ok(());
     }
+    let impossible =
+        |what: &str, value: f64| Err(ModelError::Value(format!("link {link:?}: {what} is {value}, which no body has")));
     if inertia.mass < 0.0 {
-        return Err(ModelError::BadInertia { link: link.to_owned(), what: "mass [kg]", value: inertia.mass });
+        return impossible("mass [kg]", inertia.mass);
     }
     Quantity::MASS.check("mass", inertia.mass).map_err(|what| out_of_range("link", link, what))?;
     Quantity::LENGTH.check_all("centre of mass", &inertia.com).map_err(|what| out_of_range("link", link, what))?;
@@ -106,8 +114,7 @@ pub(super) fn check_inertia(link: &str, inertia: &LinkInertia, moves: bool) -> R
     let moments = inertia.inertia_com.symmetric_eigenvalues();
     let smallest = moments.min();
     if smallest < -moment_floor(inertia.mass, moments.amax()) {
-        let what = "smallest principal moment of inertia [kg m²]";
-        return Err(ModelError::BadInertia { link: link.to_owned(), what, value: smallest });
+        return impossible("smallest principal moment of inertia [kg m²]", smallest);
     }
     Ok(())
 }

@@ -108,8 +108,10 @@ impl Builder<'_> {
             match leader {
                 Some(index) if !is_elastic => self.bodies[follower.body].coordinate = index,
                 _ => {
-                    let (joint, leader) = (follower.joint.clone(), follower.leader.clone());
-                    return Err(ModelError::BadMimic { joint, leader });
+                    return Err(ModelError::Structure(format!(
+                        "joint {:?} mimics {:?}, which is not a movable, independent joint",
+                        follower.joint, follower.leader
+                    )));
                 }
             }
         }

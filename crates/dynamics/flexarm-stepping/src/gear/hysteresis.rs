@@ -98,10 +98,10 @@ impl SliderState {
         let way = delta - self.delta;
         let mut lost = 0.0;
         for (s, slider) in self.s.iter_mut().zip(&law.sliders) {
-            let stuck = *s + way;
-            let held = stuck.clamp(-slider.reach, slider.reach);
-            lost += slider.stiffness * slider.reach * (stuck - held).abs();
-            *s = held;
+            let trial = *s + way;
+            let limited = trial.clamp(-slider.reach, slider.reach);
+            lost += slider.stiffness * slider.reach * (trial - limited).abs();
+            *s = limited;
         }
         self.delta = delta;
         lost

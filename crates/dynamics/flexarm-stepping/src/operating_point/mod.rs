@@ -154,8 +154,8 @@ impl OperatingPoint {
         self.X_WT_rigid = self.data.X_WF(&self.tool);
         if self.curved {
             // Leave backlash with the dedicated solver.
-            let held = Plant { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.plant.clone() };
-            let e = loaded_equilibrium(&held, &self.tool, F_T_W, 0.0)?;
+            let fixed = Plant { motion: std::sync::Arc::new(Held(q.to_vec())), ..self.plant.clone() };
+            let e = loaded_equilibrium(&fixed, &self.tool, F_T_W, 0.0)?;
             self.q.rows_mut(m, e.len()).copy_from(&e);
             // The factor of the springs at rest does not apply beyond the backlash.
             self.factored = false;

@@ -124,7 +124,7 @@ impl ReducedArm {
             self.evaluate(0.0, &x, &v, &at_rest);
             let tau = self.data.tau.clone();
             if let Some(servo) = &mut self.servo {
-                servo.hold(&tau);
+                servo.start_at(&tau);
             }
         }
         self.at_time(0.0, &x, &mut v)?;

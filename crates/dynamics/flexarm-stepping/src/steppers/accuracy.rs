@@ -44,16 +44,16 @@ pub fn error_of_a_period(kind: StepperKind, h_omega: f64, zeta: f64) -> f64 {
 /// Returns the maximum error over `steps` steps; `None` if the stepper refuses them.
 fn swing(kind: StepperKind, h: f64, zeta: f64, steps: usize) -> Option<f64> {
     let plant = body_on_spring(zeta)?;
-    let mut seen = Observation::new(&plant);
+    let mut observed = Observation::new(&plant);
     let mut stepper = new_stepper(kind, plant, h, Start::Undeformed).ok()?;
     let w = (1.0 - zeta * zeta).sqrt();
     let mut largest = 0.0f64;
     for k in 1..=steps {
         stepper.step().ok()?;
-        stepper.observe(&mut seen);
+        stepper.observe(&mut observed);
         let t = h * k as f64;
         let truth = 1.0 - (-zeta * t).exp() * ((w * t).cos() + zeta / w * (w * t).sin());
-        largest = largest.max((seen.q[0] / LOAD - truth).abs());
+        largest = largest.max((observed.q[0] / LOAD - truth).abs());
     }
     largest.is_finite().then_some(largest)
 }

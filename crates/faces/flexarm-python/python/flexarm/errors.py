@@ -23,7 +23,7 @@ class RunError(Error, RuntimeError):
 
 
 class FileError(InputError):
-    """A file or folder is missing, unreadable, or already exists."""
+    """A file or folder is missing, unreadable, or already exists; the content of a table is wrong."""
 
 
 class RobotError(InputError):

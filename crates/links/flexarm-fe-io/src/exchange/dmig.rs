@@ -153,7 +153,7 @@ fn assemble(
     let rows: BTreeSet<DofLabel> = entries.iter().map(|(row, ..)| *row).collect();
     let columns: BTreeSet<DofLabel> = entries.iter().map(|(_, column, ..)| *column).collect();
     if entries.is_empty() {
-        warnings.push(format!("DMIG {name} (line {}) has no entries", header.line.unwrap_or(0)));
+        warnings.push(format!("{}: DMIG {name} has no entries", header.place()));
         return Ok(None);
     }
     // Columns without grids in common with the rows: loads and other rectangular matrices.

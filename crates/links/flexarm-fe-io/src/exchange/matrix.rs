@@ -282,7 +282,12 @@ fn common_value(
     let what = if mirrored.is_some() { "mirrored entries" } else { "the entry twice" };
     Err(ErrorPosition { origin, line }.fail(
         element,
-        format!("{what}: {:e} (line {}) and {:e}", first.value, first.line, last.value),
+        format!(
+            "{what}: {:e} at {} and {:e}",
+            first.value,
+            ErrorPosition::line(origin, first.line as usize).place(),
+            last.value
+        ),
         format!("equal values, mirrored ones to {LARGEST_ASYMMETRY:.0e} of sqrt(k_ii k_jj)"),
         "stiffness and mass are symmetric; do not add up matrices of several parts in one file",
     ))

@@ -19,6 +19,11 @@ impl<'a> ErrorPosition<'a> {
         Self { origin, line: Some(line) }
     }
 
+    /// Place, as in errors.
+    pub(super) fn place(&self) -> String {
+        format!("{}{}", self.origin, self.line.map_or(FilePosition::File, FilePosition::Line))
+    }
+
     pub(super) fn fail(
         &self,
         element: impl Into<Box<str>>,

@@ -93,11 +93,11 @@ impl<'d, 't> Table<'d, 't> {
 
     /// Rejects every key that is not in `known`.
     pub(super) fn only(&self, known: &[&str]) -> Result<(), FlexFileError> {
-        let strange = |key: &&Spanned<_>| {
+        let is_unknown = |key: &&Spanned<_>| {
             let key: &std::borrow::Cow<'_, str> = key.get_ref();
             !known.contains(&key.as_ref())
         };
-        let Some(key) = self.map.keys().find(strange) else { return Ok(()) };
+        let Some(key) = self.map.keys().find(is_unknown) else { return Ok(()) };
         let name = key.get_ref();
         Err(self.document.fail(
             key.span(),

@@ -1,5 +1,7 @@
 //! Errors in the text of a reduced-link file, with their position.
 
+use flexarm_settings::Place;
+
 use crate::error::FemError;
 
 /// Kind of error, for programs; the message is for users.
@@ -36,7 +38,7 @@ pub enum FlexErrorKind {
 
 /// Error in a reduced-link file.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{origin}:{line}:{column}: {element}: found {found}; expected {expected}{}", mend(.help))]
+#[error("{}: {element}: found {found}; expected {expected}{}", Place::of_file(origin).at(*line, *column), mend(.help))]
 pub struct FlexFileError {
     /// Kind of error.
     pub kind: FlexErrorKind,

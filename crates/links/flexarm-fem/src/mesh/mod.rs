@@ -16,10 +16,10 @@ mod hinges;
 mod orientation;
 mod parts;
 mod promote;
-mod seat;
 mod select;
 mod selector;
 mod surface;
+mod surface_nodes;
 
 use std::collections::BTreeMap;
 
@@ -36,10 +36,10 @@ pub use hinges::{Bodies, Hinge, bodies};
 pub use orientation::turn_reversed;
 pub use parts::{Part, connected_parts};
 pub use promote::{Promoted, added_nodes, promoted, second_order};
-pub use seat::{Seat, Surface};
 pub use select::{SelectError, select};
 pub use selector::{NodeSelector, SelectorSyntaxError};
 pub use surface::{Skin, SkinFace, skin};
+pub use surface_nodes::{Surface, SurfaceNodes};
 
 /// Kind of an element; node order of CalculiX and Abaqus, given for each variant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -108,13 +108,13 @@ pub fn condensed_body(element: &Superelement) -> RigidPart {
 pub(super) fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<Finding> {
     let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let first = held.frequencies_hz().first().copied();
-    let mut doubts = Vec::new();
+    let mut findings = Vec::new();
     let mut see = |what: &str, value: f64, unit: &str, low: f64, high: f64, slip: &str| {
         if !(low..=high).contains(&value) {
             let said = format!(
                 "{what} is {value:.3e} {unit}; links of robots lie between {low:.0e} and {high:.0e}: are the units those declared?{slip}"
             );
-            doubts.push(Finding::warning("size", "", said, "").measured(value, if value < low { low } else { high }));
+            findings.push(Finding::warning("size", "", said, "").measured(value, if value < low { low } else { high }));
         }
     };
     let of_length = if (1e-2..=2e1).contains(&(size * 1e-3)) {
@@ -131,5 +131,5 @@ pub(super) fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<F
     if let Some(first) = first {
         see("the first frequency with A held", first, "Hz", 1e0, 5e4, "");
     }
-    doubts
+    findings
 }

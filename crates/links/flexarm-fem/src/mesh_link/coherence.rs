@@ -49,7 +49,7 @@ fn body_of(interface: &Interface, bodies: &Bodies) -> usize {
 
 /// Warnings about cracks and hinges in a mesh that is connected.
 pub(super) fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Finding> {
-    let mut doubts: Vec<Finding> = bodies
+    let mut findings: Vec<Finding> = bodies
         .hinges
         .iter()
         .take(3)
@@ -69,9 +69,9 @@ pub(super) fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Finding> {
             p.y,
             p.z
         );
-        doubts.push(Finding::warning("coincident-nodes", "", said, "").measured(found.pairs.len() as f64, 0.0));
+        findings.push(Finding::warning("coincident-nodes", "", said, "").measured(found.pairs.len() as f64, 0.0));
     }
-    doubts
+    findings
 }
 
 pub(super) fn check_fit(mesh: &Mesh) -> Result<(), MeshLinkError> {

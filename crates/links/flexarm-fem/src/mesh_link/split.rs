@@ -36,7 +36,7 @@ pub(super) fn split(
     frames: LinkFrames,
     K12: &Matrix12,
     at: SplitAt,
-    doubts: &mut Vec<Finding>,
+    findings: &mut Vec<Finding>,
 ) -> Result<(LinkFrames, [RigidPart; 2]), MeshLinkError> {
     let normal = frames.p_AB();
     let parts = |point: Vector3<f64>| -> Result<[RigidPart; 2], CutError> {
@@ -47,7 +47,7 @@ pub(super) fn split(
         }
     };
     let (p_LS, said) = split_point(&frames, K12, at, &|p| parts(p).is_ok());
-    doubts.extend(said.map(|said| Finding::warning("split", "", said, "")));
+    findings.extend(said.map(|said| Finding::warning("split", "", said, "")));
     let parts = parts(p_LS).map_err(|source| MeshLinkError::Split { p: p_LS.into(), source })?;
     Ok((frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z)), parts))
 }

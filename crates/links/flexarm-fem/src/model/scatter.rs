@@ -43,13 +43,13 @@ impl NodeGraph {
 
         // Neighbours of each node on or below the diagonal: nodes of its elements, each once.
         let (mut starts, mut rows, mut before) = (vec![0_u32], Vec::new(), Vec::new());
-        let mut seen = vec![u32::MAX; n];
+        let mut marked = vec![u32::MAX; n];
         for node in 0..n {
             let first = rows.len();
             for e in &of_node[element_starts[node] as usize..element_starts[node + 1] as usize] {
                 for other in elements[*e as usize] {
-                    if *other as usize >= node && seen[*other as usize] != node as u32 {
-                        seen[*other as usize] = node as u32;
+                    if *other as usize >= node && marked[*other as usize] != node as u32 {
+                        marked[*other as usize] = node as u32;
                         rows.push(*other);
                     }
                 }

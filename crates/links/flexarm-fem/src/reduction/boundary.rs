@@ -177,7 +177,7 @@ impl Boundary {
     }
 
     /// Whether fixing the boundary DoF supports the model by itself.
-    pub(super) fn holds(&self) -> bool {
+    pub(super) fn supports(&self) -> bool {
         !self.rigid.is_empty()
     }
 

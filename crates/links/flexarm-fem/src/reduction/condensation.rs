@@ -145,12 +145,12 @@ impl<'m> Condensation<'m> {
     ) -> Result<Self, ReductionError> {
         // Free DoF, less six of an unsupported mesh (grounding), and their Cholesky factor.
         let mut solved = boundary.free().to_vec();
-        let rigid = if boundary.holds() {
+        let rigid = if boundary.supports() {
             None
         } else {
             let R = model.rigid_modes(&Vector3::zeros());
-            let held = statically_determinate(model, &solved, &R).ok_or(ReductionError::NoGrounding)?;
-            for position in held.into_iter().rev() {
+            let grounded = statically_determinate(model, &solved, &R).ok_or(ReductionError::NoGrounding)?;
+            for position in grounded.into_iter().rev() {
                 solved.remove(position);
             }
             Some(R)

@@ -162,8 +162,8 @@ fn every_element_and_tie_passes_the_gate() {
             }
             // First-order elements in so few cells are too stiff, which gives a warning; there is
             // no other warning.
-            let is_order = |doubt: &str| crate::mesh::second_order(kind).is_some() && doubt.contains("first order");
-            let others: Vec<_> = result.doubts.iter().filter(|doubt| !is_order(&doubt.message)).collect();
+            let is_order = |finding: &str| crate::mesh::second_order(kind).is_some() && finding.contains("first order");
+            let others: Vec<_> = result.findings.iter().filter(|finding| !is_order(&finding.message)).collect();
             assert!(others.is_empty(), "{others:?}");
         }
     }

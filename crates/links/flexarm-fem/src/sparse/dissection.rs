@@ -183,17 +183,17 @@ impl Graph {
         let half = self.weights.iter().map(|w| i64::from(*w)).sum::<i64>() / 2;
         let (mut side, mut grown) = (vec![1; self.len()], 0);
         let mut queue = std::collections::VecDeque::new();
-        let mut seen = vec![false; self.len()];
+        let mut visited = vec![false; self.len()];
         // The parts of a graph that is not connected follow one after the other.
         for first in (start..self.len() as u32).chain(0..start) {
-            if !std::mem::replace(&mut seen[first as usize], true) {
+            if !std::mem::replace(&mut visited[first as usize], true) {
                 queue.push_back(first);
             }
             while let Some(v) = queue.pop_front().filter(|_| grown < half) {
                 side[v as usize] = 0;
                 grown += self.weight(v);
                 let around = self.around(v).iter();
-                queue.extend(around.filter(|u| !std::mem::replace(&mut seen[**u as usize], true)));
+                queue.extend(around.filter(|u| !std::mem::replace(&mut visited[**u as usize], true)));
             }
         }
         for v in 0..self.len() as u32 {

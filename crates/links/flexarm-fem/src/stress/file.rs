@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, Matrix3, Rotation3, Vector3};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use serde::{Deserialize, Serialize};
 
-use super::error::StressFileError;
+use super::error::StressError;
 use super::fields::{INERTIA_LOADS, StressFields, StressSite};
 use crate::material::Material;
 
@@ -92,10 +92,10 @@ pub fn write_stress(fields: &StressFields) -> Vec<u8> {
 /// Reads a stress file.
 ///
 /// # Errors
-/// [`StressFileError`].
-pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
+/// [`StressError`].
+pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressError> {
     let about = read_about(bytes)?;
-    let file = SafeTensors::deserialize(bytes).map_err(|e| StressFileError(format!("damaged: {e}")))?;
+    let file = SafeTensors::deserialize(bytes).map_err(|e| StressError::file(format!("damaged: {e}")))?;
     let file = Tensors { file: &file };
     let (materials, poses) = (file.rows("materials", 3)?, file.rows("pose", 12)?);
     let frequencies_hz = file.numbers("frequency_hz")?;
@@ -106,7 +106,7 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
     let compliance = file.compliance(wrenches)?;
     if about.interfaces.len() != poses.len() {
         let what = format!("{} interfaces have {} poses", about.interfaces.len(), poses.len());
-        return Err(StressFileError(what));
+        return Err(StressError::file(what));
     }
     let pose = |row: &Vec<f64>| {
         let R = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&row[..9]));
@@ -127,26 +127,26 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressFileError> {
 }
 
 /// Reads the description in the metadata.
-fn read_about(bytes: &[u8]) -> Result<About, StressFileError> {
+fn read_about(bytes: &[u8]) -> Result<About, StressError> {
     let (_, header) =
-        SafeTensors::read_metadata(bytes).map_err(|e| StressFileError(format!("not a stress file: {e}")))?;
+        SafeTensors::read_metadata(bytes).map_err(|e| StressError::file(format!("not a stress file: {e}")))?;
     let text = header.metadata().as_ref().and_then(|about| about.get(KEY));
     let about = text.and_then(|text| serde_json::from_str(text).ok());
-    let missing = || StressFileError(format!("its metadata have no key {KEY:?} with format, link and interfaces"));
+    let missing = || StressError::file(format!("its metadata have no key {KEY:?} with format, link and interfaces"));
     let about: About = about.ok_or_else(missing)?;
     if about.format != FORMAT {
-        return Err(StressFileError(format!("format {:?}, expected {FORMAT:?}", about.format)));
+        return Err(StressError::file(format!("format {:?}, expected {FORMAT:?}", about.format)));
     }
     Ok(about)
 }
 
-fn check_finite(numbers: &[f64]) -> Result<(), StressFileError> {
+fn check_finite(numbers: &[f64]) -> Result<(), StressError> {
     let finite = numbers.iter().all(|number| number.is_finite());
     if finite { Ok(()) } else { Err(impossible_number()) }
 }
 
-fn impossible_number() -> StressFileError {
-    StressFileError(format!("a number is not finite, or a stress beyond {LARGEST:e} Pa per unit"))
+fn impossible_number() -> StressError {
+    StressError::file(format!("a number is not finite, or a stress beyond {LARGEST:e} Pa per unit"))
 }
 
 struct Tensors<'a> {
@@ -154,31 +154,33 @@ struct Tensors<'a> {
 }
 
 impl<'a> Tensors<'a> {
-    fn tensor(&self, name: &'static str, kind: Dtype) -> Result<TensorView<'a>, StressFileError> {
-        let tensor = self.file.tensor(name).map_err(|_| StressFileError(format!("tensor {name:?} is missing")))?;
+    fn tensor(&self, name: &'static str, kind: Dtype) -> Result<TensorView<'a>, StressError> {
+        let tensor = self.file.tensor(name).map_err(|_| StressError::file(format!("tensor {name:?} is missing")))?;
         if tensor.dtype() == kind {
             return Ok(tensor);
         }
         let found = tensor.dtype();
-        Err(StressFileError(format!("tensor {name:?} has numbers of the type {found:?}, expected {kind:?}")))
+        Err(StressError::file(format!("tensor {name:?} has numbers of the type {found:?}, expected {kind:?}")))
     }
 
-    fn numbers(&self, name: &'static str) -> Result<Vec<f64>, StressFileError> {
+    fn numbers(&self, name: &'static str) -> Result<Vec<f64>, StressError> {
         let tensor = self.tensor(name, Dtype::F64)?;
         Ok(tensor.data().as_chunks().0.iter().map(|word| f64::from_le_bytes(*word)).collect())
     }
 
-    fn rows(&self, name: &'static str, width: usize) -> Result<Vec<Vec<f64>>, StressFileError> {
+    fn rows(&self, name: &'static str, width: usize) -> Result<Vec<Vec<f64>>, StressError> {
         let tensor = self.tensor(name, Dtype::F64)?;
         if tensor.shape().len() != 2 || tensor.shape()[1] != width {
             let found = tensor.shape();
-            return Err(StressFileError(format!("tensor {name:?} has the shape {found:?}, expected rows of {width}")));
+            return Err(StressError::file(format!(
+                "tensor {name:?} has the shape {found:?}, expected rows of {width}"
+            )));
         }
         Ok(self.numbers(name)?.chunks_exact(width).map(<[f64]>::to_vec).collect())
     }
 
     /// Whole numbers of 32 or 64 bits.
-    fn whole(&self, name: &'static str) -> Result<Vec<u64>, StressFileError> {
+    fn whole(&self, name: &'static str) -> Result<Vec<u64>, StressError> {
         if let Ok(tensor) = self.tensor(name, Dtype::U64) {
             return Ok(tensor.data().as_chunks().0.iter().map(|word| u64::from_le_bytes(*word)).collect());
         }
@@ -186,16 +188,16 @@ impl<'a> Tensors<'a> {
         Ok(tensor.data().as_chunks().0.iter().map(|word| u64::from(u32::from_le_bytes(*word))).collect())
     }
 
-    fn sites(&self, materials: usize) -> Result<Vec<StressSite>, StressFileError> {
+    fn sites(&self, materials: usize) -> Result<Vec<StressSite>, StressError> {
         let positions = self.rows("position", 3)?;
         let (nodes, kinds, tied) = (self.whole("node")?, self.whole("material")?, self.numbers("from_tie")?);
         let sites = positions.len();
         if [nodes.len(), kinds.len(), tied.len()] != [sites; 3] {
             let what = format!("its tensors \"node\", \"material\", \"from_tie\" do not have {sites} entries");
-            return Err(StressFileError(what));
+            return Err(StressError::file(what));
         }
         if kinds.iter().any(|kind| *kind >= materials as u64) {
-            return Err(StressFileError("an index is out of range".into()));
+            return Err(StressError::file("an index is out of range"));
         }
         positions.iter().try_for_each(|position| check_finite(position))?;
         let site = |k: usize| StressSite {
@@ -207,21 +209,21 @@ impl<'a> Tensors<'a> {
         Ok((0..sites).map(site).collect())
     }
 
-    fn triangles(&self, sites: usize) -> Result<Vec<[u32; 3]>, StressFileError> {
+    fn triangles(&self, sites: usize) -> Result<Vec<[u32; 3]>, StressError> {
         let corners = self.whole("triangle")?;
         if corners.iter().any(|site| *site >= sites as u64) {
-            return Err(StressFileError("an index is out of range".into()));
+            return Err(StressError::file("an index is out of range"));
         }
         Ok(corners.as_chunks().0.iter().map(|corners| corners.map(|site| site as u32)).collect())
     }
 
     /// Stress by fields, six rows per site.
-    fn stress(&self, fields: usize, sites: usize) -> Result<DMatrix<f32>, StressFileError> {
+    fn stress(&self, fields: usize, sites: usize) -> Result<DMatrix<f32>, StressError> {
         let tensor = self.tensor("stress", Dtype::F32)?;
         let expected = [fields, sites, 6];
         if tensor.shape() != expected {
             let found = tensor.shape();
-            return Err(StressFileError(format!("tensor \"stress\" has the shape {found:?}, expected {expected:?}")));
+            return Err(StressError::file(format!("tensor \"stress\" has the shape {found:?}, expected {expected:?}")));
         }
         let stress: Vec<f32> = tensor.data().as_chunks().0.iter().map(|word| f32::from_le_bytes(*word)).collect();
         if !stress.iter().all(|stress| stress.abs() < LARGEST) {
@@ -231,11 +233,11 @@ impl<'a> Tensors<'a> {
     }
 
     /// Displacements under unit wrenches.
-    fn compliance(&self, wrenches: usize) -> Result<DMatrix<f64>, StressFileError> {
+    fn compliance(&self, wrenches: usize) -> Result<DMatrix<f64>, StressError> {
         let numbers = self.numbers("compliance")?;
         let (found, expected) = (numbers.len(), wrenches * wrenches);
         if found != expected || wrenches == 0 {
-            return Err(StressFileError(format!("tensor \"compliance\" has {found} entries, expected {expected}")));
+            return Err(StressError::file(format!("tensor \"compliance\" has {found} entries, expected {expected}")));
         }
         check_finite(&numbers)?;
         Ok(DMatrix::from_vec(wrenches, wrenches, numbers))

@@ -18,18 +18,23 @@ impl StressFields {
     /// first one.
     ///
     /// # Errors
-    /// [`StressError::OffSurface`] if the point is farther from it than the longest edge at this
-    /// node; [`StressError::NoSurface`].
+    /// [`StressError`] if the point is farther from it than the longest edge at this node, or there
+    /// is no surface.
     pub fn nearest_site(&self, point: &Vector3<f64>) -> Result<usize, StressError> {
         let place = |k: u32| self.sites[k as usize].position;
         let from = |k: &u32| (place(*k) - point).norm();
         let nearest = self.triangles.iter().flatten().copied().min_by(|a, b| from(a).total_cmp(&from(b)));
-        let site = nearest.ok_or(StressError::NoSurface)?;
+        let site = nearest.ok_or_else(|| StressError("the stress file has no surface".into()))?;
         let own = self.triangles.iter().filter(|corners| corners.contains(&site)).flatten();
         let edge = own.map(|k| (place(*k) - place(site)).norm()).fold(0.0, f64::max);
         let off = from(&site);
         if off > edge {
-            return Err(StressError::OffSurface { nearest_mm: (place(site) * 1e3).into(), off_mm: 1e3 * off });
+            let (at, off) = (place(site) * 1e3, 1e3 * off);
+            return Err(StressError(format!(
+                "the nearest node of the surface, at ({:.1}, {:.1}, {:.1}) mm, is {off:.1} mm away, farther than the \
+                 edges of the mesh there: give a point on the surface, in the axes of the link (m)",
+                at.x, at.y, at.z
+            )));
         }
         Ok(site as usize)
     }
@@ -53,14 +58,17 @@ impl StressFields {
     /// * `angle`: by which it is turned about the outward normal (rad).
     ///
     /// # Errors
-    /// [`StressError::NormalDirection`].
+    /// [`StressError`] for a direction normal to the surface.
     pub fn strain_by_stress(&self, site: usize, direction: &Vector3<f64>, angle: f64) -> Result<[f64; 6], StressError> {
         let n = self.normal(site);
         let along = direction - n * n.dot(direction);
         // Not above, rather than below: a direction of zero length gives no number.
         if !(along.norm() > TANGENTIAL * direction.norm()) {
-            let normal = n.map(|x| (x * 100.0).round() / 100.0 + 0.0).into();
-            return Err(StressError::NormalDirection { normal });
+            let n = n.map(|x| (x * 100.0).round() / 100.0 + 0.0);
+            return Err(StressError(format!(
+                "the direction has no part along the surface, whose normal there is [{}, {}, {}]",
+                n.x, n.y, n.z
+            )));
         }
         let d = Rotation3::from_axis_angle(&Unit::new_unchecked(n), angle) * along.normalize();
         let material = &self.materials[self.sites[site].material];

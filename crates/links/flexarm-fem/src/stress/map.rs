@@ -9,7 +9,7 @@
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
-use super::error::StressError;
+use super::error::{REDUCE_AGAIN, StressError};
 use super::fields::{INERTIA_LOADS, StressFields};
 use crate::modal::{Field, ModalLink, axial};
 use crate::reduced::ElasticSplit;
@@ -76,14 +76,19 @@ impl StressFields {
         let modes = link.coordinates().saturating_sub(wrenches);
         if !link.is_craig_bampton() || 6 * link.interfaces.len() != wrenches || modes > self.frequencies_hz.len() {
             let (interfaces, modes) = (wrenches / 6, self.frequencies_hz.len());
-            return Err(StressError::OtherCoordinates { interfaces, modes });
+            return Err(StressError(format!(
+                "stress is stored for {interfaces} interfaces and {modes} fixed-interface modes, which are not the \
+                 coordinates of the modal link: leave out eigenmodes, or {REDUCE_AGAIN}"
+            )));
         }
         let n = link.coordinates();
         let K_cc = link.K.view((0, 0), (wrenches, wrenches)).into_owned();
         self.check(&K_cc)?;
         let mut A = DMatrix::identity(n, n);
         A.view_mut((0, 0), (wrenches, wrenches)).copy_from(&(K_cc * factor));
-        let K = (&link.K * factor).cholesky().ok_or(StressError::SingularLink)?;
+        let K = (&link.K * factor)
+            .cholesky()
+            .ok_or_else(|| StressError("the stiffness of the modal link is not positive definite".into()))?;
         let own: Vec<DVector<f64>> = (0..INERTIA_LOADS).map(|j| &A * K.solve(&modal_force(link, j))).collect();
         let columns: Vec<usize> = (0..wrenches).chain((0..modes).map(|k| wrenches + INERTIA_LOADS + k)).collect();
         // A mode stresses a link that is stiffer by a factor more by this factor.
@@ -114,7 +119,8 @@ impl StressFields {
             X
         };
         let X: Vec<Matrix6<f64>> = joints.iter().map(displacement).collect();
-        let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or(StressError::SingularJoint);
+        let singular = || StressError("the stiffness of a joint is singular".into());
+        let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or_else(singular);
         let at_B = |springs: &mut dyn Iterator<Item = &Matrix6<f64>>| {
             let C: Vec<Matrix6<f64>> = springs.map(inverse).collect::<Result<_, _>>()?;
             let at_B: Matrix6<f64> = X.iter().zip(&C).map(|(X, C)| X * C * X.transpose()).sum();
@@ -159,9 +165,9 @@ impl StressFields {
                 let of_mesh = fields.column(wrenches + j);
                 residual.iter_mut().zip(of_mesh.iter()).for_each(|(residual, field)| *residual = f64::from(*field));
                 for (k, own) in own.iter().enumerate() {
-                    let held = mapped.column(k);
-                    let pairs = residual.iter_mut().zip(held.iter());
-                    pairs.for_each(|(residual, held)| *residual -= own * f64::from(*held));
+                    let kept = mapped.column(k);
+                    let pairs = residual.iter_mut().zip(kept.iter());
+                    pairs.for_each(|(residual, kept)| *residual -= own * f64::from(*kept));
                 }
                 let pairs = mapped.column_mut(n + j).into_iter().zip(&residual);
                 pairs.for_each(|(mapped, residual)| *mapped = *residual as f32);
@@ -186,7 +192,12 @@ impl StressFields {
             ((product[(i, j)] - unit) * scale(i, j)).abs()
         });
         let off = off.fold(0.0, f64::max);
-        if off <= SAME_LINK { Ok(()) } else { Err(StressError::OtherLink { off }) }
+        if off <= SAME_LINK {
+            return Ok(());
+        }
+        Err(StressError::file(format!(
+            "the stress file belongs to another link: stiffness times its compliance differs from 1 by {off:.1e}"
+        )))
     }
 }
 

@@ -31,7 +31,7 @@ mod recovery;
 #[cfg(test)]
 mod tests;
 
-pub use error::{StressError, StressFileError};
+pub use error::StressError;
 pub use fields::{INERTIA_LOADS, SectionForces, StressFields, StressSite};
 pub use file::{parse_stress, write_stress};
 pub use map::{StressMap, inertia_loads};

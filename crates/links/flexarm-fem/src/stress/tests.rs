@@ -264,5 +264,5 @@ fn the_stress_of_a_link_at_rest_does_not_depend_on_its_model() {
     let other =
         Bar::new(ElementKind::Tet10, [8, 2, 2], [0.6, 0.1, 0.06]).reduced(2, |source| source.stress_fields("x"));
     let error = other.chain_map(two.0, &two.1, &[link.split.K_S]).unwrap_err();
-    assert!(matches!(error, StressError::OtherLink { .. }), "{error}");
+    assert!(error.to_string().contains("belongs to another link"), "{error}");
 }

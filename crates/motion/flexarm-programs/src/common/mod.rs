@@ -11,6 +11,8 @@ pub(crate) mod value;
 
 use std::rc::Rc;
 
+use flexarm_settings::Place;
+
 /// Byte range in one of the files of a program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Span {
@@ -44,6 +46,8 @@ pub(crate) fn fail<T>(span: Span, message: impl Into<String>) -> Result<T> {
 #[derive(Debug, Clone)]
 pub(crate) struct Text {
     pub(crate) path: std::path::PathBuf,
+    /// The file as a whole.
+    pub(crate) place: Place,
     pub(crate) text: Rc<str>,
     /// Start of each line.
     lines: Vec<usize>,
@@ -52,7 +56,7 @@ pub(crate) struct Text {
 impl Text {
     pub(crate) fn new(path: &std::path::Path, text: &str) -> Self {
         let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        Self { path: path.to_owned(), text: text.into(), lines }
+        Self { path: path.to_owned(), place: Place::of_file(path.display()), text: text.into(), lines }
     }
 
     /// Line of a byte offset, from 1.

@@ -1,6 +1,7 @@
 //! Recorder of a running program: its moves, its notes, and the resulting position of the robot.
 
-use flexarm_path::program::{Blend, Item, Move, MoveKind, Note, Program, Target};
+use flexarm_path::program::{Blend, Item, Move, MoveKind, Program, Target};
+use flexarm_settings::{Finding, Place};
 use flexarm_spatial::Pose;
 
 use super::{Fail, Result, Span, Text, fail};
@@ -17,8 +18,8 @@ pub(crate) struct Recorder<'a> {
     pub(crate) next: Sources,
     notes: Vec<RepeatedNote>,
     moves: usize,
-    /// Values of external axes, and the lines where they were first given.
-    external: [Option<(f64, usize)>; 6],
+    /// Values of external axes, and the places where they were first given.
+    external: [Option<(f64, Place)>; 6],
     place: RobotPosition,
 }
 
@@ -70,13 +71,18 @@ impl<'a> Recorder<'a> {
             next: Sources::default(),
             notes: Vec::new(),
             moves: 0,
-            external: [None; 6],
+            external: Default::default(),
             place,
         }
     }
 
-    pub(crate) fn line(&self, span: Span) -> usize {
+    fn line(&self, span: Span) -> usize {
         self.texts[span.file].line(span.start)
+    }
+
+    /// Line in the file.
+    pub(crate) fn place(&self, span: Span) -> Place {
+        self.texts[span.file].place.line(self.line(span))
     }
 
     pub(crate) fn excerpt(&self, span: Span) -> String {
@@ -120,7 +126,7 @@ impl<'a> Recorder<'a> {
 
     /// Adds a dwell.
     pub(crate) fn dwell(&mut self, seconds: f64, span: Span) -> Result<()> {
-        let item = Item::Dwell { line: self.line(span), seconds };
+        let item = Item::Dwell { place: self.place(span), seconds };
         item.check().or_else(|error| fail(span, error.to_string()))?;
         if seconds > 0.0 {
             self.count(span)?;
@@ -150,7 +156,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Adds a move, whose `line` and `statement` are set from its span.
+    /// Adds a move, whose `place` and `statement` are set from its span.
     pub(crate) fn add(&mut self, mut step: Move, span: Span) -> Result<()> {
         self.count(span)?;
         step.check().or_else(|error| fail(span, error.to_string()))?;
@@ -162,7 +168,7 @@ impl<'a> Recorder<'a> {
                  or tell the joint values at the start (`start`)",
             );
         }
-        step.line = self.line(span);
+        step.place = self.place(span);
         step.statement = self.excerpt(span);
         self.place = match (&step.to, &step.kind) {
             (_, MoveKind::Arc { angle: Some(_), .. }) => RobotPosition::Unknown,
@@ -181,20 +187,20 @@ impl<'a> Recorder<'a> {
 
     /// Checks the external axes of a target (`None`: not given); they must not move.
     pub(crate) fn external_axes(&mut self, values: [Option<f64>; 6], span: Span) -> Result<()> {
-        let line = self.line(span);
+        let place = self.place(span);
         for (k, (value, before)) in values.iter().zip(&mut self.external).enumerate() {
             match (value, &before) {
                 (Some(value), Some((old, since))) if (old - value).abs() > 1e-6 => {
                     return fail(
                         span,
                         format!(
-                            "external axis {} moves, from {old} (line {since}) to {value}; only the axes of the arm are moved here: leave \
+                            "external axis {} moves, from {old} ({since}) to {value}; only the axes of the arm are moved here: leave \
                              it at one value",
                             k + 1
                         ),
                     );
                 }
-                (Some(value), None) => *before = Some((*value, line)),
+                (Some(value), None) => *before = Some((*value, place.clone())),
                 _ => {}
             }
         }
@@ -270,23 +276,22 @@ impl<'a> Recorder<'a> {
 }
 
 impl RepeatedNote {
-    fn as_note(&self, texts: &[Text]) -> Note {
-        if self.lines.is_empty() {
-            return Note { line: None, text: self.text.clone() };
-        }
-        let lines: Vec<String> = self.lines.iter().map(usize::to_string).collect();
-        let word = if lines.len() == 1 { "line" } else { "lines" };
-        let more = match self.times - lines.len() {
+    /// The note at its first line, with the further lines in its text.
+    fn as_note(&self, texts: &[Text]) -> Finding {
+        let file = &texts[self.file].place;
+        let Some((first, others)) = self.lines.split_first() else {
+            return Finding::warning("program", file.to_string(), self.text.clone(), "").as_note();
+        };
+        let others: Vec<String> = others.iter().map(usize::to_string).collect();
+        let more = match self.times - self.lines.len() {
             0 => String::new(),
             more => format!(" and {more} more"),
         };
-        let file = match self.file {
+        let also = match others.len() {
             0 => String::new(),
-            file => {
-                texts[file].path.file_name().map(|name| format!(" of {}", name.to_string_lossy())).unwrap_or_default()
-            }
+            1 => format!(" (also in line {}{more})", others[0]),
+            _ => format!(" (also in lines {}{more})", others.join(", ")),
         };
-        let line = (self.file == 0).then(|| self.lines[0]);
-        Note { line, text: format!("{} ({word} {}{more}{file})", self.text, lines.join(", ")) }
+        Finding::warning("program", file.line(*first).to_string(), format!("{}{also}", self.text), "").as_note()
     }
 }

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 
 use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target};
+use flexarm_settings::Place;
 use flexarm_spatial::Pose;
 use nalgebra::{Translation3, Vector3};
 
@@ -165,8 +166,10 @@ impl Gcode<'_> {
         let X_BT = Pose::from_parts(Translation3::from(to + self.offset), R_BT);
         let to = Target::Pose { X_BT, configuration: Configuration::Nearest };
         let X_WB = self.frame(self.work_frame);
-        self.recorder
-            .add(Move { line: 0, statement: String::new(), kind, to, X_WB, X_FT: None, speed, blend }, span)?;
+        self.recorder.add(
+            Move { place: Place::default(), statement: String::new(), kind, to, X_WB, X_FT: None, speed, blend },
+            span,
+        )?;
         self.has_moved = true;
         Ok(())
     }

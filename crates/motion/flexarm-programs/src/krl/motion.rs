@@ -2,6 +2,7 @@
 
 use flexarm_path::ToolCurve;
 use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target};
+use flexarm_settings::Place;
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -144,7 +145,7 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
     }
     let blend = if machine.dialect.in_spline { Blend::Pass } else { blend(machine, arguments, span)? };
     let end = end_of_arc(machine, &context, &kind, &to, span);
-    let step = Move { line: 0, statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
+    let step = Move { place: Place::default(), statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
     machine.recorder.next = sources(machine, arguments, &context, &step);
     machine.recorder.add(step, span)?;
     if let Some(X_BT) = end {

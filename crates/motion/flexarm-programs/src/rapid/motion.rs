@@ -3,6 +3,7 @@
 use std::rc::Rc;
 
 use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target};
+use flexarm_settings::Place;
 use flexarm_spatial::Pose;
 use nalgebra::Translation3;
 
@@ -123,7 +124,7 @@ pub(super) fn motion(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument
     };
     let speed = speed(machine, arguments, places.speed, span)?;
     let blend = zone(machine, arguments, places.zone, span)?;
-    let step = Move { line: 0, statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
+    let step = Move { place: Place::default(), statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
     let target = machine.argument_origin(arguments, places.target);
     let via = places.circle_point.and_then(|place| machine.argument_origin(arguments, place));
     machine.recorder.next = Sources { target, via };

@@ -12,6 +12,7 @@ mod parse;
 use std::rc::Rc;
 
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Speed, Target};
+use flexarm_settings::Place;
 use flexarm_spatial::Pose;
 
 use crate::common::frames::{Circle, pose_rotation_vector, rotation_vector_of};
@@ -301,7 +302,16 @@ fn motion(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span:
         Some(r) if r != 0.0 => Blend::Distance(r),
         _ => Blend::Stop,
     };
-    let step = Move { line: 0, statement: String::new(), kind, to, X_WB: Pose::identity(), X_FT, speed, blend };
+    let step = Move {
+        place: Place::default(),
+        statement: String::new(),
+        kind,
+        to,
+        X_WB: Pose::identity(),
+        X_FT,
+        speed,
+        blend,
+    };
     machine.recorder.add(step, span)
 }
 

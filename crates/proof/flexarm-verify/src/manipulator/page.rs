@@ -5,7 +5,7 @@ use flexarm_draw::{CurveLook, Panel, PlotCurve};
 use super::drives_page::{elastic_drives, which_flexibility};
 use super::methods::{CONSTRAINTS, EIGHT_PARTS, FINE_CONSTRAINTS, MODAL, Methods, TWO_PARTS};
 use super::pick::{self, LOADS, Pick};
-use super::runs::{Run, SEEN_EVERY_MS, Sizes};
+use super::runs::{Run, SAMPLE_MS, Sizes};
 use super::{ALL_MODES, AXES, DAMPING, Findings, LINKS, TOLERANCE};
 use crate::bench::in_modes;
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, fixed, plain, word};
@@ -102,7 +102,7 @@ fn methods_table(found: &Methods) -> Table {
          truth along x, y, z and in all, over the truth's peak of {:.4} mm. {} s, tool seen every {} ms.",
         1e3 * found.peak_m,
         found.truth.duration_s,
-        plain(SEEN_EVERY_MS)
+        plain(SAMPLE_MS)
     );
     let heads = ["links", "stepper", "x", "y", "z", "peak", "sag", "f_1", "Δx", "Δy", "Δz", "Δ"];
     let mut table = Table::new(caption, &heads);

@@ -11,9 +11,9 @@ use crate::page::plain;
 use crate::{Error, Pace};
 
 /// Sampling rate of the TCP (1/s).
-const SEEN_HZ: f64 = 500.0;
+const SAMPLE_HZ: f64 = 500.0;
 /// Sampling interval (ms).
-pub(super) const SEEN_EVERY_MS: f64 = 1e3 / SEEN_HZ;
+pub(super) const SAMPLE_MS: f64 = 1e3 / SAMPLE_HZ;
 
 /// Results kept of a run.
 pub(super) struct Run {
@@ -141,7 +141,7 @@ impl<'a, 'p> Runs<'a, 'p> {
         modelling: &Modelling,
         options: &RunOptions,
     ) -> Result<Run, Error> {
-        let options = RunOptions { log_rate_hz: SEEN_HZ, ..options.clone() };
+        let options = RunOptions { log_rate_hz: SAMPLE_HZ, ..options.clone() };
         let weight = weight(options.stepper, options.step_s);
         let mut progress = |t: f64, total: f64| {
             self.pace.at((self.done + weight * t / total) / self.all);

@@ -14,7 +14,7 @@ const SOURCE: [f64; WITH_ENCODER] = [4_577_800.0, 7_518_900.0, 4_099_900.0];
 const PINOCCHIO_HZ: [[f64; 3]; 2] = [[12.10, 12.90, 24.76], [9.88, 13.39, 35.08]];
 /// Lowest vibration in the recordings while axis 1 moves, runs 1 and 3; there the link encoder
 /// moves five times as far as the motor (Hz).
-pub(super) const SEEN_HZ: [f64; 2] = [5.9, 6.3];
+pub(super) const MEASURED_HZ: [f64; 2] = [5.9, 6.3];
 /// A robot of the same class whose wrist gears were identified.
 pub(super) const WRIST: &str = "robots/kr500_identified/robot.toml";
 

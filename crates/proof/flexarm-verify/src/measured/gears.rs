@@ -58,7 +58,7 @@ impl Gears {
         let mut gears = Self {
             rests: Vec::new(),
             stiffness: stiffness(robot)?,
-            time_s: runs[SHOWN - 1].seen().map(|i| runs[SHOWN - 1].time_s[i]).collect(),
+            time_s: runs[SHOWN - 1].compared().map(|i| runs[SHOWN - 1].time_s[i]).collect(),
             measured: Vec::new(),
             simulated: Vec::new(),
         };
@@ -90,7 +90,7 @@ pub(super) fn arm_along(robot: &Robot, run: &Recording) -> Result<Plant, Error> 
 fn simulated(robot: &Robot, run: &Recording) -> Result<Vec<Vec<f64>>, Error> {
     let plant = arm_along(robot, run)?;
     let first = plant.model.n_actuated();
-    let mut seen = Observation::new(&plant);
+    let mut observed = Observation::new(&plant);
     let mut stepper = new_stepper(ALPHA, plant, STEP_S / STEPS as f64, Start::Equilibrium).map_err(step_error)?;
     let mut bends = vec![Vec::new(); WITH_ENCODER];
     for sample in 0..run.time_s.len() {
@@ -99,9 +99,9 @@ fn simulated(robot: &Robot, run: &Recording) -> Result<Vec<Vec<f64>>, Error> {
                 stepper.step().map_err(step_error)?;
             }
         }
-        stepper.observe(&mut seen);
+        stepper.observe(&mut observed);
         // The spring coordinate is link minus motor.
-        bends.iter_mut().enumerate().for_each(|(axis, bends)| bends.push(-seen.q[first + axis]));
+        bends.iter_mut().enumerate().for_each(|(axis, bends)| bends.push(-observed.q[first + axis]));
     }
     Ok(bends)
 }
@@ -122,10 +122,10 @@ impl Stack {
     fn new(runs: &[Recording], bends: &[Vec<Vec<f64>>], axis: usize) -> Self {
         let low = LowPass::new(COMPARED_HZ, 1.0 / STEP_S);
         let stacked = |of: &dyn Fn(&Recording, usize) -> Vec<f64>| -> Vec<f64> {
-            let part = |(k, run): (usize, &Recording)| low.of(&of(run, k))[run.seen()].to_vec();
+            let part = |(k, run): (usize, &Recording)| low.of(&of(run, k))[run.compared()].to_vec();
             runs.iter().enumerate().flat_map(part).collect()
         };
-        let counts: Vec<usize> = runs.iter().map(|run| run.seen().len()).collect();
+        let counts: Vec<usize> = runs.iter().map(|run| run.compared().len()).collect();
         let offset = |own: usize| {
             let part = |(k, n): (usize, &usize)| vec![f64::from(u8::from(k == own)); *n];
             counts.iter().enumerate().flat_map(part).collect()

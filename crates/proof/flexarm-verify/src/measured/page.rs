@@ -2,7 +2,7 @@
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
-use super::frequencies::{Frequencies, SEEN_HZ, WRIST};
+use super::frequencies::{Frequencies, MEASURED_HZ, WRIST};
 use super::gears::{COMPARED_HZ, Gears, LATE_S, SHOWN};
 use super::recording::{AXES, EDGE_S, RUNS, SMOOTH_HZ, STEP_S, WITH_ENCODER};
 use super::servo::Servos;
@@ -226,7 +226,7 @@ fn frequencies(case: &mut Case, found: &Frequencies) {
         found.error,
         Bound::AtMost(FREQUENCY_BOUND),
     );
-    let [low, high] = SEEN_HZ;
+    let [low, high] = MEASURED_HZ;
     case.text(format!(
         "While axis 1 moves, the recordings show a vibration of {} to {} Hz in which the link encoder moves \
          five times as far as the motor, in phase. With the gears alone the model is higher at that pose; \

@@ -82,14 +82,14 @@ impl Recording {
     }
 
     /// Range of samples that are compared.
-    pub(super) fn seen(&self) -> std::ops::Range<usize> {
+    pub(super) fn compared(&self) -> std::ops::Range<usize> {
         let edge = (EDGE_S / STEP_S).round() as usize;
         edge..self.time_s.len().saturating_sub(edge + 1)
     }
 
     /// Compared samples in which an axis moves.
     pub(super) fn moving(&self, axis: usize) -> impl Iterator<Item = usize> + '_ {
-        self.seen().filter(move |i| self.v[axis][*i].abs() > MOVING)
+        self.compared().filter(move |i| self.v[axis][*i].abs() > MOVING)
     }
 
     /// Values of all joints at one sample.

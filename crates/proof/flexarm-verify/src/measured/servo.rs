@@ -36,7 +36,7 @@ impl Servos {
 }
 
 fn tracking(run: &Recording, position: impl Fn(usize, usize) -> f64) -> Tracking {
-    std::array::from_fn(|axis| rms(run.seen().map(|i| run.reference[axis][i] - position(axis, i))))
+    std::array::from_fn(|axis| rms(run.compared().map(|i| run.reference[axis][i] - position(axis, i))))
 }
 
 /// Simulates all axes under torque control with the default gains of robot files.
@@ -50,7 +50,7 @@ fn simulated(robot: &Robot, run: &Recording, feed_forward: f64) -> Result<Tracki
         plant.servo = Some(Arc::new(Servo { axes, ..(**servo).clone() }));
     }
     let first = plant.model.n_actuated();
-    let mut seen = Observation::new(&plant);
+    let mut observed = Observation::new(&plant);
     let mut stepper = new_stepper(ALPHA, plant, STEP_S / STEPS as f64, Start::Equilibrium).map_err(step_error)?;
     let mut positions = vec![Vec::new(); AXES];
     for sample in 0..run.time_s.len() {
@@ -59,10 +59,10 @@ fn simulated(robot: &Robot, run: &Recording, feed_forward: f64) -> Result<Tracki
                 stepper.step().map_err(step_error)?;
             }
         }
-        stepper.observe(&mut seen);
+        stepper.observe(&mut observed);
         for (axis, to) in positions.iter_mut().enumerate() {
-            let spring = if axis < WITH_ENCODER { seen.q[first + axis] } else { 0.0 };
-            to.push(seen.q[axis] + spring);
+            let spring = if axis < WITH_ENCODER { observed.q[first + axis] } else { 0.0 };
+            to.push(observed.q[axis] + spring);
         }
     }
     Ok(tracking(run, |axis, i| positions[axis][i]))

@@ -129,10 +129,10 @@ fn relative(run: &Recording, computed: &[Vec<f64>]) -> [f64; AXES] {
 }
 
 fn shown_of(run: &Recording, computed: &[Vec<f64>]) -> TorqueCurves {
-    let seen = |x: &[f64]| x[run.seen()].to_vec();
+    let compared = |x: &[f64]| x[run.compared()].to_vec();
     TorqueCurves {
-        time_s: seen(&run.time_s),
-        measured: run.smooth_torque.iter().take(3).map(|x| seen(x)).collect(),
-        computed: computed.iter().take(3).map(|x| seen(x)).collect(),
+        time_s: compared(&run.time_s),
+        measured: run.smooth_torque.iter().take(3).map(|x| compared(x)).collect(),
+        computed: computed.iter().take(3).map(|x| compared(x)).collect(),
     }
 }

@@ -18,7 +18,7 @@ pub(super) const DAMPING: f64 = 0.03;
 /// Tolerance of the stepper with error control.
 pub(super) const TOLERANCE: f64 = 1e-10;
 /// Interval at which errors are sampled, a multiple of every step size (s).
-pub(super) const SEEN_EVERY_S: f64 = 10e-3;
+pub(super) const SAMPLE_S: f64 = 10e-3;
 /// Shorter sampling interval of the truth, so that its peak is resolved (s).
 const TRUTH_EVERY_S: f64 = 5e-4;
 /// Step size of the claims (s).
@@ -54,7 +54,7 @@ impl Steps {
         let precise = StepperKind::Reference(ReferenceSettings::new(TOLERANCE));
         let fine = rig.path(precise, TRUTH_EVERY_S, TRUTH_EVERY_S, DURATION_S)?;
         let peak_m = fine.iter().map(|u| u.norm()).worst();
-        let stride = (SEEN_EVERY_S / TRUTH_EVERY_S).round() as usize;
+        let stride = (SAMPLE_S / TRUTH_EVERY_S).round() as usize;
         let truth: Vec<Vector3<f64>> = fine.iter().step_by(stride).copied().collect();
         let steps_s = if quick { vec![1e-3, 0.5e-3] } else { vec![5e-3, 2e-3, 1e-3, 0.5e-3, 0.2e-3, 0.1e-3] };
         let steppers = steppers().map(|(name, kind)| {
@@ -98,7 +98,7 @@ fn steppers() -> [(&'static str, StepperKind); 5] {
 /// Maximum distance of the end from the truth, over the peak. NaN for the explicit stepper beyond
 /// its stability limit, where it refuses the step size.
 fn step_error(rig: &Rig, kind: StepperKind, h: f64, truth: &[Vector3<f64>], peak_m: f64) -> Result<f64, Error> {
-    match rig.path(kind, h, SEEN_EVERY_S, DURATION_S) {
+    match rig.path(kind, h, SAMPLE_S, DURATION_S) {
         Ok(path) => Ok(path.iter().zip(truth).map(|(a, b)| (a - b).norm()).worst() / peak_m),
         Err(_) if kind == StepperKind::Rk4 => Ok(f64::NAN),
         Err(error) => Err(error),

@@ -5,7 +5,7 @@ use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
 use super::bar::{BALL_KG, HEIGHT_M, LENGTH_M, WIDTH_M};
 use super::motion::{
-    CLAIMED_STEP_S, DAMPING, DURATION_S, SEEN_EVERY_S, SPEED, SPIN_STEP_S, SpinUp, Steps, TIME_S, TOLERANCE, TRUE_PARTS,
+    CLAIMED_STEP_S, DAMPING, DURATION_S, SAMPLE_S, SPEED, SPIN_STEP_S, SpinUp, Steps, TIME_S, TOLERANCE, TRUE_PARTS,
 };
 use super::study::{COUNTS, Deflection, EndLoads, STATION_LOAD, Splits, StationLoad, Stations, Weight};
 use super::{Findings, mesh_page};
@@ -231,7 +231,7 @@ fn steps(case: &mut Case, found: &Steps) {
         "Bar and ball let go undeformed, {DURATION_S} s of ringing up and down ({:.2} Hz, damping {damping} % of it, proportional to stiffness). Largest error of \
          the end every {} ms, over the largest deflection ({:.4} mm). Truth: the same two-part model by the stepper with error control, tolerance {TOLERANCE:e}.",
         found.first_hz,
-        plain(1e3 * SEEN_EVERY_S),
+        plain(1e3 * SAMPLE_S),
         1e3 * found.peak_m
     );
     let mut table = Table::new(caption, &["stepper"]);

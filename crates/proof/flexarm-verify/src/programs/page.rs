@@ -3,7 +3,7 @@
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 
 use super::stored::{StoredMotion, StoredRun, StoredRuns};
-use super::today::{MOTION, ROUNDING_M, SEEN_HZ, Today};
+use super::today::{MOTION, ROUNDING_M, SAMPLE_HZ, Today};
 use super::{About, Findings};
 use crate::page::{Bound, Case, Cell, Figure, Table, digits, error, plain, word};
 
@@ -53,7 +53,7 @@ fn today(case: &mut Case, found: &Today) {
     let caption = format!(
         "`trajectories/{MOTION}.toml`, tool every {} ms against the stored truth (rounded to the nanometre, {:.0e} of its peak of {:.5} mm): largest distance, along x, \
          y, z and in all, over the peak; distance at the start.",
-        plain(1e3 / SEEN_HZ),
+        plain(1e3 / SAMPLE_HZ),
         ROUNDING_M / found.peak_m,
         1e3 * found.peak_m
     );

@@ -15,7 +15,7 @@ const ROBOT: &str = "robots/kr210/links.toml";
 pub(super) const MOTION: &str = "pick_and_place";
 const CURVE: &str = "tests/verification/kr210_pick_and_place_pinocchio.csv";
 /// Sampling rate of the stored curve (1/s).
-pub(super) const SEEN_HZ: f64 = 100.0;
+pub(super) const SAMPLE_HZ: f64 = 100.0;
 /// Half a unit of the last digit of the stored curve (m).
 pub(super) const ROUNDING_M: f64 = 0.5e-9;
 /// Tolerance of the stepper with error control.
@@ -83,7 +83,7 @@ impl Stepped {
         truth: &Curve,
         (name, stepper, step_s, bound): Method,
     ) -> Result<Self, Error> {
-        let options = RunOptions { stepper, step_s, log_rate_hz: SEEN_HZ, ..RunOptions::default() };
+        let options = RunOptions { stepper, step_s, log_rate_hz: SAMPLE_HZ, ..RunOptions::default() };
         let request = RunRequest::keeping(Keep::Curves);
         let trace = robot.model(&Modelling::default())?.simulate_with(motion, &options, request)?.trace;
         if trace.rows.len() != truth.flexible.len() {

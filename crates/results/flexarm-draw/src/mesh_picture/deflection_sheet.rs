@@ -113,8 +113,8 @@ pub(super) fn modes(pictures: &MeshPictures<'_>) -> Result<Image, PictureError> 
     if panels.is_empty() {
         return Err(PictureError::NoModes);
     }
-    let held = pictures.interfaces.first().map_or("", |i| i.name.as_str());
-    Ok(draw(pictures, &format!("{}: modes with {held} held", link.name), "shapes have no size of their own", panels))
+    let base = pictures.interfaces.first().map_or("", |i| i.name.as_str());
+    Ok(draw(pictures, &format!("{}: modes with {base} held", link.name), "shapes have no size of their own", panels))
 }
 
 fn draw(pictures: &MeshPictures<'_>, title: &str, remark: &str, panels: Vec<Panel>) -> Image {

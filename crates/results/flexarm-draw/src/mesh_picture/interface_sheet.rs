@@ -69,11 +69,11 @@ pub(super) fn best_side(axes: &LinkAxes, tied: &[Tied]) -> Vector3<f64> {
     ] {
         let toward = axes.viewpoint(turn, tilt);
         // The second interface has a slightly larger weight, since it is the one that moves.
-        let seen =
+        let visible =
             |(number, tied): (usize, &Tied)| (if number == 1 { 1.1 } else { 1.0 }) * tied.normal.dot(&toward).max(0.0);
-        let seen: f64 = tied.iter().enumerate().map(seen).sum();
-        if seen > best.0 + 1e-9 {
-            best = (seen, toward);
+        let visible: f64 = tied.iter().enumerate().map(visible).sum();
+        if visible > best.0 + 1e-9 {
+            best = (visible, toward);
         }
     }
     best.1

@@ -45,8 +45,8 @@ pub fn stress_sheet(picture: &StressPicture<'_>) -> Image {
     let height = (HEIGHT - HEAD) / 2;
     for (row, toward) in [toward, -toward].into_iter().enumerate() {
         let places = picture.worst.iter().copied().enumerate();
-        let seen: Vec<(usize, usize)> = places.filter(|(_, node)| is_visible(picture, *node, &toward)).collect();
-        let panel = panel(picture, &edges, &seen, &axes, toward, [WIDTH, height]);
+        let visible: Vec<(usize, usize)> = places.filter(|(_, node)| is_visible(picture, *node, &toward)).collect();
+        let panel = panel(picture, &edges, &visible, &axes, toward, [WIDTH, height]);
         sheet.paste(&panel, 0, HEAD + row * height);
     }
     sheet.fill(0.0, (HEAD + height) as f64, WIDTH as f64, 1.0, color::RULE);
@@ -77,18 +77,18 @@ pub fn side_of_worst(picture: &StressPicture<'_>, axes: &LinkAxes) -> Vector3<f6
     across.try_normalize(1e-12).unwrap_or(axes.out)
 }
 
-/// * `seen`: number and node of the worst places that face the viewer.
+/// * `visible`: number and node of the worst places that face the viewer.
 fn panel(
     picture: &StressPicture<'_>,
     edges: &[[u32; 2]],
-    seen: &[(usize, usize)],
+    visible: &[(usize, usize)],
     axes: &LinkAxes,
     toward: Vector3<f64>,
     [width, height]: [usize; 2],
 ) -> Image {
     let peak = picture.worst.first().map_or(0.0, |node| picture.stress[*node]);
     let mut marks: Vec<Mark> = sheet::edges(picture.positions, edges, 1.0, color::FAINT, [0.5, 0.0]).collect();
-    let dots = seen.iter().map(|(_, node)| Mark::Dot {
+    let dots = visible.iter().map(|(_, node)| Mark::Dot {
         at: picture.positions[*node],
         diameter: 9.0,
         color: color::INK,
@@ -100,7 +100,7 @@ fn panel(
     let paint = Paint::Magnitude { values: picture.stress, peak: if peak > 0.0 { peak } else { 1.0 } };
     let scene = Scene { positions: picture.positions, triangles: picture.triangles, paint, marks: &marks };
     let mut image = render(&scene, &view, width, height);
-    for (number, node) in seen {
+    for (number, node) in visible {
         let text = format!("{} {} MPa", number + 1, numbers::significant(1e-6 * picture.stress[*node], 3));
         sheet::label(&mut image, &view, &picture.positions[*node], &text, 15.0, color::INK);
     }

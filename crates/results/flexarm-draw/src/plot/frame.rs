@@ -6,7 +6,7 @@ use plotters::coord::ranged1d::{AsRangedCoord, ValueFormatter};
 use plotters::prelude::*;
 
 use crate::plot::curve::{CurveLook, Panel, PlotCurve};
-use crate::plot::legend::{dot_radius, look_of};
+use crate::plot::legend::{dot_radius, style_of};
 use crate::plot::style::Style;
 use crate::plot::svg::{Area, Chart, MARK, PlotError, plain};
 
@@ -60,16 +60,16 @@ impl Frame<'_> {
             .draw()?;
         self.draw_marks(&mut chart)?;
         for (curve, points) in self.panel.curves.iter().zip(self.points) {
-            let look = look_of(curve, self.all, style);
+            let shape = style_of(curve, self.all, style);
             if curve.look.is_dashed() {
                 let (dash, gap) = (6 * style.stroke, 4 * style.stroke);
-                let dashes = DashedLineSeries::new(points.iter().copied(), dash, gap, look);
+                let dashes = DashedLineSeries::new(points.iter().copied(), dash, gap, shape);
                 chart.draw_series(dashes)?;
             } else if curve.look != CurveLook::Dots {
-                chart.draw_series(LineSeries::new(points.iter().copied(), look))?;
+                chart.draw_series(LineSeries::new(points.iter().copied(), shape))?;
             }
             if matches!(curve.look, CurveLook::Dots | CurveLook::Marked) {
-                let dots = points.iter().map(|point| Circle::new(*point, dot_radius(style), look.filled()));
+                let dots = points.iter().map(|point| Circle::new(*point, dot_radius(style), shape.filled()));
                 chart.draw_series(dots)?;
             }
         }
@@ -91,8 +91,8 @@ impl Frame<'_> {
             chart.draw_series(DashedLineSeries::new(line, dash, gap, MARK.stroke_width(1)))?;
             let (left, _) = chart.backend_coord(&(*x, up.end));
             if self.named && left >= free {
-                let look = ("sans-serif", font).into_font().color(&MARK);
-                let text = EmptyElement::at((*x, up.end)) + Text::new(name.clone(), (3, 2), look);
+                let shape = ("sans-serif", font).into_font().color(&MARK);
+                let text = EmptyElement::at((*x, up.end)) + Text::new(name.clone(), (3, 2), shape);
                 chart.draw_series(std::iter::once(text))?;
                 free = left + 6 + name.chars().count() as i32 * font * 6 / 10;
             }

@@ -8,7 +8,7 @@ use crate::plot::style::Style;
 use crate::plot::svg::{Area, PlotError, ink};
 
 /// Returns colour and width of a curve; curves with the same name look the same in all panels.
-pub(super) fn look_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
+pub(super) fn style_of(curve: &PlotCurve, all: &[&PlotCurve], style: &Style) -> ShapeStyle {
     match curve.look {
         CurveLook::Total => BLACK.stroke_width(style.stroke + style.stroke / 3),
         CurveLook::Axis(k) => ink(palette::axis(k, Ground::Paper)).stroke_width(style.stroke),
@@ -61,7 +61,7 @@ pub(super) fn draw_legend(
     for (row, places) in rows.iter().enumerate() {
         let y = style.margin as i32 + row as i32 * font * 3 / 2;
         for (k, x) in places {
-            let (curve, x, look) = (curves[*k], *x as i32, look_of(curves[*k], curves, style));
+            let (curve, x, look) = (curves[*k], *x as i32, style_of(curves[*k], curves, style));
             let (from, middle, to) = (x, y + font / 2, x + font * 3 / 2);
             let cut = (to - from) / 3;
             let lines = match curve.look {

@@ -59,7 +59,7 @@ const FORMATS: &[FormatInfo] = &[
         extension: "mcap",
         file_name: "run.mcap",
         magic: b"\x89MCAP",
-        holds: Holds::Everything,
+        content: ContentLevel::Everything,
         by_default: true,
         feature: Some("mcap"),
         survives_a_kill: true,
@@ -73,7 +73,7 @@ const FORMATS: &[FormatInfo] = &[
         extension: "rrd",
         file_name: "run.rrd",
         magic: b"RRF",
-        holds: Holds::Pictures,
+        content: ContentLevel::Pictures,
         by_default: true,
         feature: Some("rerun"),
         survives_a_kill: true,
@@ -87,7 +87,7 @@ const FORMATS: &[FormatInfo] = &[
         extension: "csv",
         file_name: "run.csv",
         magic: b"",
-        holds: Holds::Table,
+        content: ContentLevel::Table,
         by_default: true,
         feature: None,
         survives_a_kill: true,
@@ -101,7 +101,7 @@ const FORMATS: &[FormatInfo] = &[
         extension: "parquet",
         file_name: "run.parquet",
         magic: b"PAR1",
-        holds: Holds::DescribedTable,
+        content: ContentLevel::DescribedTable,
         by_default: false,
         feature: Some("parquet"),
         survives_a_kill: false,
@@ -127,7 +127,7 @@ pub struct FormatInfo {
     /// First bytes of every file; empty for text.
     pub magic: &'static [u8],
     /// Extent of the data that it holds.
-    pub holds: Holds,
+    pub content: ContentLevel,
     /// Whether a run writes it by default.
     pub by_default: bool,
     /// Feature of the program that enables it; `None` if it is always available.
@@ -145,7 +145,7 @@ pub struct FormatInfo {
 
 /// Extent of the data that a format holds, from most to least.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Holds {
+pub enum ContentLevel {
     /// Every number of every sample, poses (of links at most 200 per second), surfaces, and the
     /// description of the run.
     Everything,
@@ -157,7 +157,7 @@ pub enum Holds {
     Pictures,
 }
 
-impl Holds {
+impl ContentLevel {
     fn is_table(self) -> bool {
         matches!(self, Self::DescribedTable | Self::Table)
     }
@@ -209,13 +209,13 @@ impl RecordingFormat {
     /// Returns the formats that are read back, in the order of decreasing contents.
     pub fn read_back() -> Vec<Self> {
         let mut formats: Vec<Self> = Self::ALL.into_iter().filter(|format| format.is_read_back()).collect();
-        formats.sort_by_key(|format| format.info().holds);
+        formats.sort_by_key(|format| format.info().content);
         formats
     }
 
     /// Whether recordings of this format are read back; others are for viewing.
     pub fn is_read_back(self) -> bool {
-        self.info().holds != Holds::Pictures
+        self.info().content != ContentLevel::Pictures
     }
 
     /// Whether this process can write the format and, if it is read back, read it. Recordings for
@@ -233,7 +233,7 @@ impl RecordingFormat {
 
     /// Whether it is a table of scalars.
     pub fn is_table(self) -> bool {
-        self.info().holds.is_table()
+        self.info().content.is_table()
     }
 
     /// Creates a recorder for `path`; `None` if the format is not available
@@ -244,21 +244,21 @@ impl RecordingFormat {
 
     /// Returns, as sentences, what a conversion from this format to another loses by their nature.
     pub fn lost_on_the_way_to(self, to: Self, header: &RunHeader) -> Vec<String> {
-        let (here, there) = (self.info().holds, to.info().holds);
+        let (here, there) = (self.info().content, to.info().content);
         let mut lost = match (here.is_table(), there.is_table()) {
             (false, true) => table::left_out(header),
             (true, false) => table::unknown(header),
             _ => Vec::new(),
         };
-        if there == Holds::Pictures && !here.is_table() {
+        if there == ContentLevel::Pictures && !here.is_table() {
             lost.push(format!("{to} files hold poses in single precision, at most 200 a second"));
         }
-        if here == Holds::Table && there != Holds::Table {
+        if here == ContentLevel::Table && there != ContentLevel::Table {
             lost.push(format!(
                 "{self} says neither robot nor trajectory, and has no set-up, result figures and events"
             ));
         }
-        if there == Holds::Table && here != Holds::Table {
+        if there == ContentLevel::Table && here != ContentLevel::Table {
             lost.push(format!("{to} has no place for robot and trajectory, set-up, result figures and events"));
         }
         lost

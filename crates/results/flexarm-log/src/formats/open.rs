@@ -19,12 +19,14 @@ pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn Ru
         Some(reader) => reader(path),
         None if !format.is_read_back() => Err(LogError::NotARecording {
             path: path.to_owned(),
+            line: None,
             found: format!("a file in the format {format}, which is for viewing"),
             expected: "a recording in a format that is read back: MCAP, Parquet or CSV".into(),
             mend: "give run.mcap of the same run".into(),
         }),
         None => Err(LogError::NotARecording {
             path: path.to_owned(),
+            line: None,
             found: format!("a file in the format {format}"),
             expected: "a format that this build can read".into(),
             mend: format!("use a build with {format}, or convert the file there"),
@@ -36,7 +38,7 @@ pub fn open_recording(path: &Path, format: RecordingFormat) -> Result<Box<dyn Ru
 fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
     let refuse = |found: &str, mend: String| {
         let (found, expected) = (found.to_owned(), format!("a recording of flexarm in the format {expected}"));
-        Err(LogError::NotARecording { path: path.to_owned(), found, expected, mend })
+        Err(LogError::NotARecording { path: path.to_owned(), line: None, found, expected, mend })
     };
     if path.is_dir() {
         let inside = path.join(expected.info().file_name);

@@ -23,7 +23,7 @@ pub trait StudyRecorder: Send {
     ///
     /// # Panics
     /// If there is no label with this number.
-    fn seat(&self, number: usize) -> Box<dyn Recorder>;
+    fn recorder(&self, number: usize) -> Box<dyn Recorder>;
 
     /// Ends the file, with a text (Markdown) that compares the runs.
     ///

@@ -131,12 +131,12 @@ pub fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
         let mut firsts: BTreeMap<[i32; 3], u32> = BTreeMap::new();
         let keys = mesh.positions.iter().map(|p| [0, 1, 2].map(|c| ((p[c] - low[c]) / size * cells) as i32));
         let merged: Vec<u32> = keys.zip(0..).map(|(key, k)| *firsts.entry(key).or_insert(k)).collect();
-        let mut seen = BTreeSet::new();
+        let mut names = BTreeSet::new();
         triangles = mesh.triangles.iter().map(|corners| corners.map(|k| merged[k as usize])).collect();
         triangles.retain(|[a, b, c]| {
             let mut sorted = [*a, *b, *c];
             sorted.sort_unstable();
-            a != b && b != c && c != a && seen.insert(sorted)
+            a != b && b != c && c != a && names.insert(sorted)
         });
         cells /= 1.25;
     }

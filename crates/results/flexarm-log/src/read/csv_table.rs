@@ -62,8 +62,9 @@ impl RunSource for CsvRun {
                 let field = row.get(place).unwrap_or_default().trim();
                 numbers.push(field.parse::<f64>().map_err(|_| {
                     let line = row.position().map_or(0, csv::Position::line);
-                    let expected = format!("a number in column {} of line {line}", place + 1);
-                    not_a_recording(&self.path, format!("{:?}", field.chars().take(40).collect::<String>()), expected)
+                    let expected = format!("a number in column {}", place + 1);
+                    let found = format!("{:?}", field.chars().take(40).collect::<String>());
+                    at_line(line, not_a_recording(&self.path, found, expected))
                 })?);
             }
             self.layout.sample(&numbers, &mut sample);
@@ -92,15 +93,20 @@ fn ends_with_a_line(path: &Path) -> Result<bool, LogError> {
     last().map_err(LogError::io(path, "read the recording"))
 }
 
+/// Adds the line of an error.
+fn at_line(at: u64, mut error: LogError) -> LogError {
+    if let LogError::NotARecording { line, .. } = &mut error {
+        *line = usize::try_from(at).ok();
+    }
+    error
+}
+
 fn broken(path: &Path, error: &csv::Error) -> LogError {
     let found = match error.kind() {
         csv::ErrorKind::UnequalLengths { pos, expected_len, len } => {
             let line = pos.as_ref().map_or(0, csv::Position::line);
-            return not_a_recording(
-                path,
-                format!("{len} fields in line {line}"),
-                format!("{expected_len}, as in line 1"),
-            );
+            let expected = format!("{expected_len} as in the header");
+            return at_line(line, not_a_recording(path, format!("{len} fields"), expected));
         }
         _ => error.to_string(),
     };

@@ -27,6 +27,7 @@ use crate::LogError;
 pub(crate) fn not_a_recording(path: &Path, found: impl Into<String>, expected: impl Into<String>) -> LogError {
     LogError::NotARecording {
         path: path.to_owned(),
+        line: None,
         found: found.into(),
         expected: expected.into(),
         mend: "give a file that flexarm compare or run wrote".into(),

@@ -2,14 +2,13 @@
 
 use std::fmt::Write as _;
 
-use flexarm_settings::closest;
+use flexarm_settings::{Place, closest};
 use roxmltree::Node;
 
 use crate::lint::Lint;
 use crate::lint::attribute::Attribute;
 use crate::lint::attribute::Kind::{self, Name};
 use crate::lint::attribute::Missing::{As, Fault, LeftOut};
-use crate::place::TextPosition;
 use crate::xml::{escaped, named};
 
 impl Lint<'_, '_> {
@@ -21,7 +20,7 @@ impl Lint<'_, '_> {
         name: &'static str,
         must: bool,
         attributes: &[Attribute],
-    ) -> Option<TextPosition> {
+    ) -> Option<Place> {
         let found = if must { self.needed(node, name) } else { named(node, name) };
         if let Some(child) = found {
             self.element(child, &format!("{}, <{name}>", self.owner), attributes);
@@ -92,14 +91,7 @@ impl Lint<'_, '_> {
     }
 
     /// Reports an attribute that is not a number, or NaN or infinite.
-    pub(super) fn not_a_number(
-        &mut self,
-        place: &TextPosition,
-        owner: &str,
-        attribute: &str,
-        found: &str,
-        expected: &str,
-    ) {
+    pub(super) fn not_a_number(&mut self, place: &Place, owner: &str, attribute: &str, found: &str, expected: &str) {
         let message = format!("{owner}: {attribute}={found:?}, expected {expected}");
         let help = "write plain decimal numbers such as 0.1 or -1.5e-3, separated by spaces";
         self.report.error(place, "not-a-number", message, help);

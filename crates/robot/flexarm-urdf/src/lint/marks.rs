@@ -2,13 +2,13 @@
 
 use nalgebra::UnitQuaternion;
 
-use crate::place::TextPosition;
 use crate::transmission::Transmission;
+use flexarm_settings::Place;
 
 /// Text for `urdf_rs`, and a mark for each of its links and joints, in the same order.
 pub struct PlainUrdf {
     pub text: String,
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     pub(crate) links: Vec<LinkMarks>,
     pub(crate) joints: Vec<JointMarks>,
     pub(crate) transmissions: Vec<Transmission>,
@@ -16,7 +16,7 @@ pub struct PlainUrdf {
 
 /// Marks of an element that may have an `<origin>`.
 pub(crate) struct OriginMark {
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     /// Rotation of `<origin>` if it is not given by `rpy`: from a quaternion, or the identity if
     /// there is no origin.
     pub(crate) quaternion: Option<UnitQuaternion<f64>>,
@@ -26,7 +26,7 @@ pub(crate) struct OriginMark {
 
 /// Elements of a link in the tree; `None` if an element does not exist.
 pub(crate) struct LinkMarks {
-    pub(crate) place: TextPosition,
+    pub(crate) place: Place,
     pub(crate) inertial: Option<OriginMark>,
     pub(crate) visuals: Vec<OriginMark>,
     pub(crate) collisions: Vec<OriginMark>,
@@ -35,9 +35,9 @@ pub(crate) struct LinkMarks {
 /// Elements of a joint in the tree; `None` if an element does not exist.
 pub(crate) struct JointMarks {
     pub(crate) joint: OriginMark,
-    pub(crate) axis: Option<TextPosition>,
-    pub(crate) limit: Option<TextPosition>,
+    pub(crate) axis: Option<Place>,
+    pub(crate) limit: Option<Place>,
     /// Acceleration, deceleration and jerk of `<limit>`; infinite if not given.
     pub(crate) rates: [f64; 3],
-    pub(crate) mimic: Option<TextPosition>,
+    pub(crate) mimic: Option<Place>,
 }

@@ -29,11 +29,10 @@ mod attribute;
 mod element;
 mod marks;
 
-use flexarm_settings::closest;
+use flexarm_settings::{Place, closest};
 use nalgebra::{Quaternion, UnitQuaternion};
 use roxmltree::Node;
 
-use crate::place::TextPosition;
 use crate::report::{Report, did_you_mean};
 use crate::transmission::transmission;
 use crate::xml::{Lines, elements, named};
@@ -131,7 +130,7 @@ struct Lint<'a, 't> {
 }
 
 impl Lint<'_, '_> {
-    fn robot(mut self, root: Node<'_, '_>, place: TextPosition) -> PlainUrdf {
+    fn robot(mut self, root: Node<'_, '_>, place: Place) -> PlainUrdf {
         let (mut links, mut joints, mut transmissions) = (Vec::new(), Vec::new(), Vec::new());
         let name = root.attribute("name").unwrap_or("");
         if name.is_empty() {

@@ -13,7 +13,9 @@ use std::path::Path;
 use nalgebra::{Matrix3, Matrix4, Rotation3, Unit, Vector3, Vector4};
 use roxmltree::{Document, Node};
 
-use super::{MAX_TRIANGLES, MeshError, TriangleMesh, UpAxis, dominant_color, stl, unit_normal};
+use flexarm_settings::{Finding, Place};
+
+use super::{MAX_TRIANGLES, TriangleMesh, UpAxis, dominant_color, mesh_error, stl, unit_normal};
 
 /// Maximum nesting depth of nodes; a deeper one is treated as a cycle of `<instance_node>`.
 const MAX_DEPTH: usize = 64;
@@ -49,11 +51,14 @@ pub(super) fn decode(
     path: &Path,
     up_axis: UpAxis,
     remarks: &mut Vec<String>,
-) -> Result<TriangleMesh, MeshError> {
-    let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "COLLADA", reason };
+) -> Result<TriangleMesh, Box<Finding>> {
+    let malformed = |reason: String| mesh_error(path.display(), format!("not a sound COLLADA file: {}", reason));
     let text = std::str::from_utf8(bytes).map_err(|error| malformed(error.to_string()))?;
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let document = Document::parse(text).map_err(|error| malformed(error.to_string()))?;
+    let document = Document::parse(text).map_err(|error| {
+        let place = Place::of_file(path.display()).at(error.pos().row as usize, error.pos().col as usize);
+        mesh_error(place, format!("not a sound COLLADA file: {error}"))
+    })?;
     let root = document.root_element();
     if root.tag_name().name() != "COLLADA" {
         return Err(malformed(format!("the root element is <{}>", root.tag_name().name())));
@@ -84,7 +89,7 @@ pub(super) fn decode(
 
     let Reader { mut mesh, normals, colors, unsupported, .. } = reader;
     if let (true, Some(feature)) = (mesh.triangles.is_empty(), &unsupported) {
-        return Err(MeshError::Unsupported { path: path.to_owned(), feature: format!("<{feature}> of COLLADA") });
+        return Err(super::unsupported(path, format!("<{feature}> of COLLADA")));
     }
     if let Some(feature) = unsupported {
         remarks.push(format!("its <{feature}> parts are left out"));
@@ -140,10 +145,10 @@ struct Reader<'a, 'i> {
 type Bindings<'a, 'i> = HashMap<&'a str, Node<'a, 'i>>;
 
 impl<'a, 'i> Reader<'a, 'i> {
-    fn malformed(&self, node: Node<'_, '_>, reason: impl std::fmt::Display) -> MeshError {
-        let line = self.document.text_pos_at(node.range().start).row;
-        let reason = format!("line {line}: {reason}");
-        MeshError::Malformed { path: self.path.to_owned(), format: "COLLADA", reason }
+    fn malformed(&self, node: Node<'_, '_>, reason: impl std::fmt::Display) -> Box<Finding> {
+        let at = self.document.text_pos_at(node.range().start);
+        let place = Place::of_file(self.path.display()).at(at.row as usize, at.col as usize);
+        mesh_error(place, format!("not a sound COLLADA file: {reason}"))
     }
 
     /// Element that a `#id` attribute refers to.
@@ -152,7 +157,7 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Adds everything below a node or scene, whose own transform is already in `T`.
-    fn children(&mut self, parent: Node<'a, 'i>, T: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
+    fn children(&mut self, parent: Node<'a, 'i>, T: &Matrix4<f64>, depth: usize) -> Result<(), Box<Finding>> {
         self.instances += 1;
         if depth > MAX_DEPTH || self.instances > MAX_INSTANCES {
             return Err(self.malformed(parent, "the nodes form a cycle or are far too many"));
@@ -182,7 +187,7 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Product of the transform elements of a node, in order.
-    fn local(&self, node: Node<'a, 'i>) -> Result<Matrix4<f64>, MeshError> {
+    fn local(&self, node: Node<'a, 'i>) -> Result<Matrix4<f64>, Box<Finding>> {
         let mut T = Matrix4::identity();
         for element in elements(node) {
             let numbers = |n: usize| {
@@ -214,7 +219,7 @@ impl<'a, 'i> Reader<'a, 'i> {
         geometry: Node<'a, 'i>,
         T_VG: &Matrix4<f64>,
         materials: &Bindings<'a, 'i>,
-    ) -> Result<(), MeshError> {
+    ) -> Result<(), Box<Finding>> {
         let Some(mesh) = named(geometry, "mesh") else { return Ok(()) };
         let transform = Transform::new(T_VG);
         for primitive in elements(mesh) {
@@ -235,7 +240,7 @@ impl<'a, 'i> Reader<'a, 'i> {
     }
 
     /// Adds one `<triangles>` or `<polylist>`; returns the number of triangles.
-    fn primitive(&mut self, primitive: Node<'a, 'i>, transform: &Transform) -> Result<usize, MeshError> {
+    fn primitive(&mut self, primitive: Node<'a, 'i>, transform: &Transform) -> Result<usize, Box<Finding>> {
         let inputs: Vec<Input> = elements(primitive)
             .filter(|n| n.tag_name().name() == "input")
             .map(|n| self.input(n))
@@ -292,12 +297,12 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(count)
     }
 
-    fn beyond(&self, primitive: Node<'_, '_>, index: u32) -> MeshError {
+    fn beyond(&self, primitive: Node<'_, '_>, index: u32) -> Box<Finding> {
         self.malformed(primitive, format!("index {index} is beyond its source"))
     }
 
     /// Reads an `<input>`; for VERTEX, the positions that it refers to.
-    fn input(&self, node: Node<'a, 'i>) -> Result<Input, MeshError> {
+    fn input(&self, node: Node<'a, 'i>) -> Result<Input, Box<Finding>> {
         let offset = node.attribute("offset").and_then(|o| o.trim().parse().ok()).unwrap_or(0usize);
         if offset > 64 {
             return Err(self.malformed(node, "an offset above 64"));

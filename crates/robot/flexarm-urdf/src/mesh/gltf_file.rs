@@ -10,8 +10,12 @@ use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use flexarm_settings::Finding;
+
 use super::collada::Transform;
-use super::{LARGEST, MAX_TRIANGLES, MeshError, TriangleMesh, check_inside, dominant_color, stl};
+use super::{
+    LARGEST, MAX_TRIANGLES, TriangleMesh, check_inside, dominant_color, mesh_error, stl, unreadable, unsupported,
+};
 
 /// Maximum nesting depth of nodes; a deeper one is treated as a cycle.
 const MAX_DEPTH: usize = 64;
@@ -117,14 +121,14 @@ const U16: u32 = 5123;
 const U32: u32 = 5125;
 const F32: u32 = 5126;
 
-pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Box<Finding>> {
     let (json, blob) = parts(bytes, path)?;
     let root: Root = serde_json::from_slice(json).map_err(|error| malformed(path, error.to_string()))?;
     // Extensions of materials do not affect the triangles.
     let required = root.extensions_required.iter().find(|e| !e.starts_with("KHR_materials") && !e.contains("texture"));
     if let Some(extension) = required {
         let feature = format!("files with the glTF extension {extension}");
-        return Err(MeshError::Unsupported { path: path.to_owned(), feature });
+        return Err(unsupported(path, feature));
     }
 
     let mut reader = Reader {
@@ -152,12 +156,12 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshErro
     Ok(mesh)
 }
 
-fn malformed(path: &Path, reason: impl Into<String>) -> MeshError {
-    MeshError::Malformed { path: path.to_owned(), format: "glTF", reason: reason.into() }
+fn malformed(path: &Path, reason: impl Into<String>) -> Box<Finding> {
+    mesh_error(path.display(), format!("not a sound glTF file: {}", reason.into()))
 }
 
 /// Splits a file into JSON and, of a binary one, the bytes after it.
-fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), MeshError> {
+fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), Box<Finding>> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
     }
@@ -166,7 +170,7 @@ fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>
         return Err(malformed(path, "cut off within its header"));
     };
     if version != 2 {
-        return Err(MeshError::Unsupported { path: path.to_owned(), feature: format!("files of glTF {version}") });
+        return Err(unsupported(path, format!("files of glTF {version}")));
     }
     let total = total as usize;
     if total > bytes.len() {
@@ -181,7 +185,7 @@ fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>
 }
 
 /// Reads the bytes of all buffers, from the file itself, separate files, or base64 text.
-fn read_buffers<'a>(root: &Root, mut blob: Option<&'a [u8]>, path: &Path) -> Result<Vec<Cow<'a, [u8]>>, MeshError> {
+fn read_buffers<'a>(root: &Root, mut blob: Option<&'a [u8]>, path: &Path) -> Result<Vec<Cow<'a, [u8]>>, Box<Finding>> {
     let mut buffers = Vec::new();
     for buffer in &root.buffers {
         let data = match buffer.uri.as_deref() {
@@ -202,7 +206,7 @@ fn read_buffers<'a>(root: &Root, mut blob: Option<&'a [u8]>, path: &Path) -> Res
                     if large {
                         return Err(malformed(path, format!("its buffer {uri:?} has more than {LARGEST} bytes")));
                     }
-                    std::fs::read(&file).map_err(|source| MeshError::Io { path: file, source })?.into()
+                    std::fs::read(&file).map_err(|error| unreadable(&file, error))?.into()
                 }
             },
         };
@@ -245,20 +249,20 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn malformed(&self, reason: impl Into<String>) -> MeshError {
+    fn malformed(&self, reason: impl Into<String>) -> Box<Finding> {
         malformed(self.path, reason)
     }
 
-    fn unsupported(&self, feature: impl Into<String>) -> MeshError {
-        MeshError::Unsupported { path: self.path.to_owned(), feature: feature.into() }
+    fn unsupported(&self, feature: impl Into<String>) -> Box<Finding> {
+        unsupported(self.path, feature.into())
     }
 
     /// Returns the element at an index, or an error if it does not exist.
-    fn get<'b, T>(&self, list: &'b [T], index: usize, what: &str) -> Result<&'b T, MeshError> {
+    fn get<'b, T>(&self, list: &'b [T], index: usize, what: &str) -> Result<&'b T, Box<Finding>> {
         list.get(index).ok_or_else(|| self.malformed(format!("{what} {index} does not exist")))
     }
 
-    fn node(&mut self, index: usize, T_parent: &Matrix4<f64>, depth: usize) -> Result<(), MeshError> {
+    fn node(&mut self, index: usize, T_parent: &Matrix4<f64>, depth: usize) -> Result<(), Box<Finding>> {
         self.instances += 1;
         if depth > MAX_DEPTH || self.instances > MAX_INSTANCES {
             return Err(self.malformed("its nodes form a cycle or are far too many"));
@@ -271,7 +275,7 @@ impl Reader<'_> {
         node.children.iter().try_for_each(|&child| self.node(child, &T, depth + 1))
     }
 
-    fn mesh(&mut self, mesh: &Mesh, T: &Matrix4<f64>) -> Result<(), MeshError> {
+    fn mesh(&mut self, mesh: &Mesh, T: &Matrix4<f64>) -> Result<(), Box<Finding>> {
         let transform = Transform::new(T);
         for primitive in &mesh.primitives {
             match primitive.mode.unwrap_or(4) {
@@ -309,7 +313,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn vectors(&self, index: usize) -> Result<Vec<Vector3<f64>>, MeshError> {
+    fn vectors(&self, index: usize) -> Result<Vec<Vector3<f64>>, Box<Finding>> {
         let accessor = self.get(&self.root.accessors, index, "accessor")?;
         if accessor.shape != "VEC3" {
             return Err(self.malformed("positions and normals are not vectors"));
@@ -322,7 +326,7 @@ impl Reader<'_> {
         self.elements(accessor, 12, vector)
     }
 
-    fn indices(&self, index: usize) -> Result<Vec<u32>, MeshError> {
+    fn indices(&self, index: usize) -> Result<Vec<u32>, Box<Finding>> {
         let accessor = self.get(&self.root.accessors, index, "accessor")?;
         if accessor.shape != "SCALAR" {
             return Err(self.malformed("its indices are not scalars"));
@@ -336,7 +340,7 @@ impl Reader<'_> {
     }
 
     /// Reads the elements of `size` bytes each, with all bounds checked.
-    fn elements<T>(&self, accessor: &Accessor, size: usize, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, MeshError> {
+    fn elements<T>(&self, accessor: &Accessor, size: usize, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, Box<Finding>> {
         if accessor.sparse.is_some() {
             return Err(self.unsupported("sparse accessors of glTF"));
         }

@@ -27,6 +27,7 @@ mod stl;
 use std::path::{Component, Path, PathBuf};
 
 use flexarm_kinematics::Pose;
+use flexarm_settings::Finding;
 use nalgebra::Vector3;
 
 pub use mass::MassProperties;
@@ -51,55 +52,19 @@ pub struct TriangleMesh {
     pub color: Option<[f32; 4]>,
 }
 
-/// Error of reading a mesh.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum MeshError {
-    /// No file was found for the reference in the URDF.
-    #[error("no file was found for {uri:?}")]
-    NotFound {
-        /// The reference.
-        uri: String,
-    },
-    /// The file cannot be read.
-    #[error("{}: cannot be read", path.display())]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// Error of the operating system.
-        #[source]
-        source: std::io::Error,
-    },
-    /// The format is unknown by both extension and content.
-    #[error("{}: unknown mesh format, expected STL, OBJ, DAE, GLB or GLTF", path.display())]
-    UnknownFormat {
-        /// The file.
-        path: PathBuf,
-    },
-    /// The file violates its format.
-    #[error("{}: not a sound {format} file: {reason}", path.display())]
-    Malformed {
-        /// The file.
-        path: PathBuf,
-        /// The format.
-        format: &'static str,
-        /// Description of the problem, with its place if the format has one.
-        reason: String,
-    },
-    /// Unsupported feature of the format.
-    #[error("{}: {feature} are not supported; export plain triangles", path.display())]
-    Unsupported {
-        /// The file.
-        path: PathBuf,
-        /// The feature.
-        feature: String,
-    },
-    /// The file has no triangles.
-    #[error("{}: there are no triangles in it", path.display())]
-    Empty {
-        /// The file.
-        path: PathBuf,
-    },
+/// Error about a mesh file.
+fn mesh_error(place: impl std::fmt::Display, message: impl Into<String>) -> Box<Finding> {
+    Box::new(Finding::error("mesh", place.to_string(), message, ""))
+}
+
+/// Error about a feature of the format that is not read.
+fn unsupported(path: &Path, feature: impl std::fmt::Display) -> Box<Finding> {
+    mesh_error(path.display(), format!("{feature} are not supported; export plain triangles"))
+}
+
+/// Error about a file that cannot be read.
+fn unreadable(path: &Path, error: impl std::fmt::Display) -> Box<Finding> {
+    mesh_error(path.display(), format!("cannot be read: {error}"))
 }
 
 /// Treatment of the `<up_axis>` of a COLLADA file; not applicable to other formats.
@@ -116,8 +81,8 @@ pub enum UpAxis {
 /// content.
 ///
 /// # Errors
-/// [`MeshError`]; arbitrary bytes never cause a panic.
-pub fn load_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshError> {
+/// Finding with the place and what is wrong; arbitrary bytes never cause a panic.
+pub fn load_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, Box<Finding>> {
     load_mesh_with(path, UpAxis::Declared)
 }
 
@@ -125,7 +90,7 @@ pub fn load_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, MeshError> {
 ///
 /// # Errors
 /// As [`load_mesh`].
-pub fn load_mesh_with(path: impl AsRef<Path>, up_axis: UpAxis) -> Result<TriangleMesh, MeshError> {
+pub fn load_mesh_with(path: impl AsRef<Path>, up_axis: UpAxis) -> Result<TriangleMesh, Box<Finding>> {
     load_with_remarks(path.as_ref(), up_axis).map(|loaded| loaded.mesh)
 }
 
@@ -138,16 +103,15 @@ pub struct Loaded {
 }
 
 /// [`load_mesh_with`] with remarks on what was left out.
-pub fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
-    let io_error = |source| MeshError::Io { path: path.to_owned(), source };
+pub fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, Box<Finding>> {
+    let io_error = |source: std::io::Error| unreadable(path, source);
     // Devices and pipes are refused, since a read may never end.
     let meta = std::fs::metadata(path).map_err(io_error)?;
     if !meta.is_file() {
-        return Err(io_error(std::io::Error::other("this is not a file; give the path of a regular one")));
+        return Err(unreadable(path, "this is not a file; give the path of a regular one"));
     }
     if meta.len() > LARGEST {
-        let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());
-        return Err(io_error(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what)));
+        return Err(unreadable(path, format!("{} bytes, more than the {LARGEST} that are read", meta.len())));
     }
     decode(&std::fs::read(path).map_err(io_error)?, path, up_axis)
 }
@@ -155,14 +119,14 @@ pub fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshErr
 /// Decodes the bytes of a mesh file; `path` gives the extension, the name for messages, and the
 /// folder of further files.
 #[doc(hidden)]
-pub fn decode(bytes: &[u8], path: &Path, up_axis: UpAxis) -> Result<Loaded, MeshError> {
+pub fn decode(bytes: &[u8], path: &Path, up_axis: UpAxis) -> Result<Loaded, Box<Finding>> {
     let mut remarks = Vec::new();
     let mesh = match format(bytes, path) {
         Some(Format::Stl) => stl::decode(bytes, path),
         Some(Format::Obj) => obj::decode(bytes, path, &mut remarks),
         Some(Format::Collada) => collada::decode(bytes, path, up_axis, &mut remarks),
         Some(Format::Gltf) => gltf_file::decode(bytes, path),
-        None => Err(MeshError::UnknownFormat { path: path.to_owned() }),
+        None => Err(mesh_error(path.display(), "unknown mesh format, expected STL, OBJ, DAE, GLB or GLTF")),
     }?;
     check(&mesh, path)?;
     Ok(Loaded { mesh, remarks })
@@ -236,10 +200,10 @@ fn format(bytes: &[u8], path: &Path) -> Option<Format> {
 }
 
 /// Checks the invariants of every reader: indices in range, finite numbers, at least one triangle.
-fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), MeshError> {
-    let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "mesh", reason };
+fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), Box<Finding>> {
+    let malformed = |reason: String| mesh_error(path.display(), format!("not a sound mesh file: {}", reason));
     if mesh.triangles.is_empty() {
-        return Err(MeshError::Empty { path: path.to_owned() });
+        return Err(mesh_error(path.display(), "there are no triangles in it"));
     }
     let count = mesh.positions.len();
     if let Some(index) = mesh.triangles.iter().flatten().find(|&&i| i as usize >= count) {

@@ -3,9 +3,11 @@
 
 use std::path::Path;
 
-use super::{MeshError, TriangleMesh, check_inside, dominant_color, stl};
+use flexarm_settings::Finding;
 
-pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Result<TriangleMesh, MeshError> {
+use super::{TriangleMesh, check_inside, dominant_color, mesh_error, stl, unsupported};
+
+pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Result<TriangleMesh, Box<Finding>> {
     let read_file = |file: &Path| {
         if let Err(reason) = check_inside(path, file) {
             remarks.push(reason.clone());
@@ -18,16 +20,13 @@ pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Re
         }
     };
     let scene = mesh_loader::Loader::default().load_obj_from_slice_with_reader(bytes, path, read_file);
-    let scene = scene.map_err(|error| MeshError::Malformed {
-        path: path.to_owned(),
-        format: "OBJ",
-        reason: error.to_string(),
-    })?;
+    let scene =
+        scene.map_err(|error| mesh_error(path.display(), format!("not a sound OBJ file: {}", error.to_string())))?;
     merged(scene, path)
 }
 
 /// Merges all parts of a scene into one mesh.
-pub(super) fn merged(scene: mesh_loader::Scene, path: &Path) -> Result<TriangleMesh, MeshError> {
+pub(super) fn merged(scene: mesh_loader::Scene, path: &Path) -> Result<TriangleMesh, Box<Finding>> {
     let mut mesh = TriangleMesh::default();
     let mut normals = Vec::new();
     let mut colors = Vec::new();
@@ -40,7 +39,7 @@ pub(super) fn merged(scene: mesh_loader::Scene, path: &Path) -> Result<TriangleM
         normals.extend(part.normals);
     }
     if mesh.positions.len() > u32::MAX as usize {
-        return Err(MeshError::Unsupported { path: path.to_owned(), feature: "more than 2^32 vertices".to_owned() });
+        return Err(unsupported(path, "more than 2^32 vertices".to_owned()));
     }
     mesh.color = dominant_color(&colors);
     if normals.len() == mesh.positions.len() {

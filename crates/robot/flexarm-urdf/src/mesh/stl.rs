@@ -3,7 +3,9 @@
 
 use std::path::Path;
 
-use super::{MeshError, TriangleMesh, obj};
+use flexarm_settings::Finding;
+
+use super::{TriangleMesh, mesh_error, obj};
 
 const HEADER: usize = 80;
 const RECORD: usize = 50;
@@ -21,8 +23,8 @@ fn size(triangles: u32) -> u64 {
     (HEADER + 4) as u64 + RECORD as u64 * u64::from(triangles)
 }
 
-pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, MeshError> {
-    let malformed = |reason: String| MeshError::Malformed { path: path.to_owned(), format: "STL", reason };
+pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Box<Finding>> {
+    let malformed = |reason: String| mesh_error(path.display(), format!("not a sound STL file: {}", reason));
     // Many exporters write "solid" into the header of binary files, so the size is decisive.
     let ascii = bytes.trim_ascii_start().starts_with(b"solid") && std::str::from_utf8(bytes).is_ok();
     if ascii && !has_binary_size(bytes) {

@@ -1,42 +1,15 @@
 //! XML as a tree that can be copied, with the place of every element; parsing and writing.
 
-use std::fmt;
 use std::path::Path;
 use std::rc::Rc;
 
-use flexarm_settings::Finding;
+use flexarm_settings::{Finding, Place};
 use roxmltree::{Document, NodeType};
 
-use crate::place::TextPosition;
 use crate::xml;
 
 /// Maximum nesting depth of elements.
 const MAX_NESTED: usize = 200;
-
-/// Place of an element; copies share the name of the file.
-#[derive(Clone, Debug)]
-pub(crate) struct At {
-    pub(crate) file: Rc<Path>,
-    pub(crate) line: u32,
-    pub(crate) column: u32,
-}
-
-impl At {
-    /// The beginning of a file.
-    pub(crate) fn start(file: &Rc<Path>) -> Self {
-        Self { file: file.clone(), line: 1, column: 1 }
-    }
-
-    pub(crate) fn place(&self) -> TextPosition {
-        TextPosition { file: self.file.to_path_buf(), line: self.line, column: self.column }
-    }
-}
-
-impl fmt::Display for At {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}:{}:{}", self.file.display(), self.line, self.column)
-    }
-}
 
 /// An element with its attributes in the order of the file. Names include their prefixes, as in the
 /// file.
@@ -45,7 +18,7 @@ pub(crate) struct Element {
     pub(crate) name: String,
     pub(crate) attributes: Vec<(String, String)>,
     pub(crate) children: Vec<Node>,
-    pub(crate) at: At,
+    pub(crate) at: Place,
 }
 
 /// Comments are omitted, since they have no effect.
@@ -112,18 +85,13 @@ fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::
         }
         _ => None,
     });
-    Element {
-        name: tag[..end].to_owned(),
-        attributes,
-        children: children.collect(),
-        at: At { file: file.clone(), line: place.line, column: place.column },
-    }
+    Element { name: tag[..end].to_owned(), attributes, children: children.collect(), at: place }
 }
 
 /// A document as text, and the origin of each of its lines.
 pub(crate) struct ExpandedText {
     pub(crate) text: String,
-    pub(crate) origins: Vec<At>,
+    pub(crate) origins: Vec<Place>,
 }
 
 /// Writes an element with one line per tag. `namespaces` are declared at the root.
@@ -135,7 +103,7 @@ pub(crate) fn write(root: &Element, namespaces: &[(String, String)]) -> Expanded
 }
 
 impl ExpandedText {
-    fn line(&mut self, depth: usize, text: &str, at: &At) {
+    fn line(&mut self, depth: usize, text: &str, at: &Place) {
         self.text.extend(std::iter::repeat_n("  ", depth));
         self.text.push_str(text);
         self.text.push('\n');

@@ -4,12 +4,12 @@ use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
 
-use super::document::{At, Element};
+use super::document::Element;
 use super::expression::ExpressionError;
 use super::expression::value::Value;
 use super::scope::{Scope, Table};
 use super::{Content, Interpreter, Outcome};
-use flexarm_settings::closest;
+use flexarm_settings::{Place, closest};
 
 /// Maximum depth of nested calls; ROS's xacro fails at about 200.
 const MAX_CALLS: usize = 300;
@@ -171,7 +171,7 @@ impl Interpreter<'_> {
         open: Vec<&Parameter>,
         scope: &Scope,
         local: &Scope,
-        at: &At,
+        at: &Place,
     ) -> Outcome<()> {
         let mut missing = Vec::new();
         for parameter in open {
@@ -206,7 +206,7 @@ impl Interpreter<'_> {
         full: &str,
         macros: &Rc<Macros>,
         scope: &Scope,
-        at: &At,
+        at: &Place,
     ) -> Outcome<(Rc<Macros>, Scope, Rc<Macro>)> {
         if let Some(found) = macros.find(full) {
             return Ok((macros.clone(), scope.clone(), found));
@@ -272,8 +272,8 @@ pub fn parameters(text: &str) -> Vec<Parameter> {
         rest = after.trim_start();
     }
     // A duplicate parameter counts once.
-    let mut seen = HashSet::new();
-    found.retain(|p| seen.insert(p.name.clone()));
+    let mut names = HashSet::new();
+    found.retain(|p| names.insert(p.name.clone()));
     found
 }
 

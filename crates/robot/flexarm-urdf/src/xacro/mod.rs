@@ -28,13 +28,13 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use document::{At, Node};
+use document::Node;
 use expression::ExpressionError;
 use expression::value::{Value, int_of};
 
-use crate::place::TextPosition;
 use crate::resolve::Resolver;
 use crate::{UrdfError, xml};
+use flexarm_settings::Place;
 use flexarm_settings::{Finding, Severity, closest};
 
 /// Maximum work for one document, approximately the number of bytes read and written.
@@ -55,8 +55,8 @@ const STACK: usize = 256 << 20;
 pub(crate) struct Expanded {
     pub(crate) text: String,
     /// Origin of each line of the text.
-    pub(crate) origins: Vec<TextPosition>,
-    /// Messages of `xacro.warning` etc., and doubts about the arguments.
+    pub(crate) origins: Vec<Place>,
+    /// Messages of `xacro.warning` etc., and warnings about the arguments.
     pub(crate) remarks: Vec<Finding>,
     /// Macros that are defined but not called, if the document has nothing else.
     pub(crate) idle_macros: Vec<String>,
@@ -110,7 +110,7 @@ pub(crate) struct Interpreter<'a> {
     /// Files being read, the innermost last.
     files: Vec<Rc<Path>>,
     /// Macros being called, with the places of the calls.
-    calls: Vec<(String, At)>,
+    calls: Vec<(String, Place)>,
     arguments: BTreeMap<String, String>,
     used_arguments: BTreeSet<String>,
     declared_arguments: BTreeSet<String>,
@@ -123,7 +123,7 @@ pub(crate) struct Interpreter<'a> {
     remarks: Vec<Finding>,
     /// Variables and YAML files whose values are used.
     sources: BTreeSet<String>,
-    at: At,
+    at: Place,
     work: usize,
     depth: usize,
 }
@@ -133,7 +133,7 @@ impl<'a> Interpreter<'a> {
         let file: Rc<Path> = path.into();
         Self {
             resolver,
-            at: At::start(&file),
+            at: Place::of_file(path.display()).at(1, 1),
             files: vec![file],
             calls: Vec::new(),
             arguments: arguments.iter().cloned().collect(),
@@ -156,17 +156,17 @@ impl<'a> Interpreter<'a> {
         let root = document::parse(text, &file)?;
         let scope = scope::Table::root();
         let root = self.element(&root, &macros::Macros::new(), &scope)?;
-        self.doubt_arguments(&given, path);
+        self.check_arguments(&given, path);
         let has_links = root.elements().any(|e| e.name == "link");
         let idle = self.defined_macros.difference(&self.called_macros).cloned();
         let idle_macros = if has_links { Vec::new() } else { idle.collect() };
         let written = document::write(&root, &self.namespaces);
-        let origins = written.origins.iter().map(At::place).collect();
+        let origins = written.origins;
         Ok(Expanded { text: written.text, origins, remarks: self.remarks, idle_macros })
     }
 
     /// Warns about unused arguments, which are probably misspelt.
-    fn doubt_arguments(&mut self, given: &[String], path: &Path) {
+    fn check_arguments(&mut self, given: &[String], path: &Path) {
         for name in given {
             if self.used_arguments.contains(name) || self.declared_arguments.contains(name) {
                 continue;
@@ -230,7 +230,7 @@ impl<'a> Interpreter<'a> {
     }
 
     /// Creates an error at a place, with the enclosing calls and files.
-    fn fault(&self, at: &At, trouble: ExpressionError) -> Box<Finding> {
+    fn fault(&self, at: &Place, trouble: ExpressionError) -> Box<Finding> {
         let calls = self.calls.iter().rev().map(|(name, at)| format!("in the macro {name:?}, called at {at}"));
         let outer = self.files[..self.files.len().saturating_sub(1)].iter().rev();
         let files = outer.map(|file| format!("included from {}", file.display()));
@@ -246,7 +246,7 @@ impl<'a> Interpreter<'a> {
 }
 
 /// Error at a place, with the enclosing calls and files on a line each.
-fn fault(at: &At, trouble: ExpressionError, trail: &[String]) -> Box<Finding> {
+fn fault(at: &Place, trouble: ExpressionError, trail: &[String]) -> Box<Finding> {
     let lines: String = trail.iter().map(|step| format!("\n  {step}")).collect();
     Box::new(Finding::error("xacro", at.to_string(), trouble.message + &lines, trouble.help))
 }

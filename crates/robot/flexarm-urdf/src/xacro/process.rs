@@ -3,13 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
-use super::document::{At, Element, Node, parse};
+use super::document::{Element, Node, parse};
 use super::expression::value::Value;
 use super::expression::{ExpressionError, is_built_in};
 use super::macros::Macros;
 use super::scope::{self, Scope, Table};
 use super::{Content, ELEMENT, Interpreter, MAX_FILES, Outcome, boolean};
-use flexarm_settings::{Finding, Severity};
+use flexarm_settings::{Finding, Place, Severity};
 
 impl Interpreter<'_> {
     /// Evaluates an element that is not xacro's, with all its content.
@@ -89,8 +89,8 @@ impl Interpreter<'_> {
             "if" | "unless" => {
                 let condition = self.required(element, "value")?.to_owned();
                 let value = self.text(&condition, scope).map_err(|e| self.fault(at, e))?;
-                let holds = boolean(&value).ok_or_else(|| self.fault(at, not_boolean(&condition, &value)))?;
-                if holds == (name == "if") {
+                let is_true = boolean(&value).ok_or_else(|| self.fault(at, not_boolean(&condition, &value)))?;
+                if is_true == (name == "if") {
                     content.nodes.extend(self.children(&element.children, macros, scope)?.nodes);
                 }
             }
@@ -275,7 +275,7 @@ impl Interpreter<'_> {
         Ok(nodes)
     }
 
-    fn included(&mut self, path: &Path, at: &At, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Vec<Node>> {
+    fn included(&mut self, path: &Path, at: &Place, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Vec<Node>> {
         if self.files.len() >= MAX_FILES {
             let trouble = ExpressionError::new(format!("files include each other more than {MAX_FILES} deep"));
             return Err(self.fault(at, trouble.help("does a file include itself?")));
@@ -303,7 +303,7 @@ impl Interpreter<'_> {
 
     /// Files that a name refers to: one, or all that match its `*`, `?` and `[...]`, ordered by
     /// name.
-    fn matching(&mut self, spec: &str, at: &At) -> Outcome<Vec<PathBuf>> {
+    fn matching(&mut self, spec: &str, at: &Place) -> Outcome<Vec<PathBuf>> {
         let path = self.beside(spec);
         if !spec.contains(['*', '?', '[']) || path.is_file() {
             return Ok(vec![path]);

@@ -7,7 +7,8 @@ use std::cell::RefCell;
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::document::At;
+use flexarm_settings::Place;
+
 use super::expression::value::{Value, float_of, int_of};
 use super::expression::{ExpressionError, KEYWORDS};
 use super::{Interpreter, boolean};
@@ -26,7 +27,7 @@ pub(crate) struct Table {
 struct Entry {
     value: Value,
     state: State,
-    at: Option<At>,
+    at: Option<Place>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -57,14 +58,14 @@ impl Table {
 
     /// Sets a value from an attribute: text may be converted to a number, and is evaluated later if
     /// `lazy`.
-    pub(crate) fn set(&self, name: &str, value: Value, lazy: bool, at: &At) {
+    pub(crate) fn set(&self, name: &str, value: Value, lazy: bool, at: &Place) {
         let value = literal(value);
         let unevaluated = lazy && matches!(value, Value::Str(_));
         let state = if unevaluated { State::Unevaluated } else { State::Known };
         self.put(name, value, state, Some(at.clone()));
     }
 
-    fn put(&self, name: &str, value: Value, state: State, at: Option<At>) {
+    fn put(&self, name: &str, value: Value, state: State, at: Option<Place>) {
         self.entries.borrow_mut().insert(name.to_owned(), Entry { value, state, at });
     }
 

@@ -4,6 +4,7 @@
 use std::rc::Rc;
 
 use flexarm_files::{YamlError, YamlNode, YamlValue, read_yaml};
+use flexarm_settings::Place;
 
 use super::Interpreter;
 use super::expression::value::{Value, float_of, lookup};
@@ -27,20 +28,22 @@ impl Interpreter<'_> {
     pub(crate) fn load_yaml(&mut self, path: &str) -> Result<Value, ExpressionError> {
         let path = self.beside(path);
         let text = self.read(&path)?;
-        let shown = path.display().to_string();
-        self.note_source(format!("the file {shown}"));
+        let place = Place::of_file(path.display());
+        self.note_source(format!("the file {place}"));
         let file: Rc<std::path::Path> = path.into();
         self.files.push(file);
-        let value = self.yaml(&text).map_err(|trouble| trouble.within(shown));
+        let value = self
+            .yaml(&text)
+            .map_err(|Located { line, column, error }| error.within(Place { column, ..place.line(line) }.to_string()));
         self.files.pop();
         value
     }
 
-    fn yaml(&mut self, text: &str) -> Result<Value, ExpressionError> {
+    fn yaml(&mut self, text: &str) -> Result<Value, Located> {
         let mut root = None;
         read_yaml(text, MAX_VALUES, |node| {
             if root.is_some() {
-                return Err(ExpressionError::new("a second document, expected one"));
+                return Err(located(node.line, ExpressionError::new("a second document, expected one")));
             }
             root = Some(self.value(node)?);
             Ok(())
@@ -48,9 +51,9 @@ impl Interpreter<'_> {
         Ok(root.unwrap_or(Value::None))
     }
 
-    fn value(&mut self, YamlNode { line, value }: YamlNode<'_>) -> Result<Value, ExpressionError> {
-        self.charge(64)?;
-        let within = |trouble: ExpressionError| trouble.within(format!("line {line}"));
+    fn value(&mut self, YamlNode { line, value }: YamlNode<'_>) -> Result<Value, Located> {
+        let within = |error| located(line, error);
+        self.charge(64).map_err(within)?;
         match value {
             YamlValue::Scalar { text, is_plain: true, tag: None } => Ok(plain(&text)),
             YamlValue::Scalar { text, tag: None, .. } => Ok(Value::text(&text)),
@@ -110,9 +113,20 @@ impl Interpreter<'_> {
     }
 }
 
-impl From<YamlError> for ExpressionError {
-    fn from(YamlError { line, message }: YamlError) -> Self {
-        Self::new(format!("line {line}: it is not YAML: {message}"))
+/// An error with its line and column in the file.
+struct Located {
+    line: usize,
+    column: Option<usize>,
+    error: ExpressionError,
+}
+
+fn located(line: usize, error: ExpressionError) -> Located {
+    Located { line, column: None, error }
+}
+
+impl From<YamlError> for Located {
+    fn from(YamlError { line, column, message }: YamlError) -> Self {
+        Self { line, column: Some(column), error: ExpressionError::new(format!("it is not YAML: {message}")) }
     }
 }
 

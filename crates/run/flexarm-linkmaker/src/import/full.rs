@@ -82,7 +82,7 @@ pub(super) fn reduce(
     map: &ImportMap,
     target: Target<'_>,
 ) -> Result<Superelement, LinkError> {
-    let refuse = |what: String| LinkError::file(&imported.origin, what);
+    let refuse = |what: String| LinkError::content(&imported.origin, what);
     let Some(mass) = &imported.mass else {
         let what = "reducing a full model requires its mass matrix: give this file too";
         return Err(refuse(format!("{what} (.mas, {})", Setting::MassFile)));
@@ -136,7 +136,7 @@ fn tied(
     let index: HashMap<i64, u32> = all.iter().enumerate().map(|(i, node)| (*node, i as u32)).collect();
     let interface = |((name, plane), frame): (&(String, NodePlane), &InterfaceFrame)| {
         let chosen = nodes_on(imported, plane)
-            .map_err(|what| LinkError::file(&imported.origin, format!("interface {name}: {what}")))?;
+            .map_err(|what| LinkError::content(&imported.origin, format!("interface {name}: {what}")))?;
         let mut nodes: Vec<u32> = chosen.iter().filter_map(|node| index.get(node).copied()).collect();
         nodes.sort_unstable();
         nodes.dedup();
@@ -155,7 +155,7 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
     let mut boundary: Vec<u32> = Vec::new();
     for interface in &map.interfaces {
         let refuse = |what: String| {
-            LinkError::file(&imported.origin, format!("interface {}: {what}; {}", interface.name, propose(imported)))
+            LinkError::content(&imported.origin, format!("interface {}: {what}; {}", interface.name, propose(imported)))
         };
         let before = boundary.len();
         for pick in &interface.picks {
@@ -184,7 +184,7 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
     sorted.sort_unstable();
     sorted.dedup();
     if sorted.len() != boundary.len() {
-        return Err(LinkError::file(&imported.origin, format!("the map {map} selects a row twice")));
+        return Err(LinkError::content(&imported.origin, format!("the map {map} selects a row twice")));
     }
     Ok(boundary)
 }

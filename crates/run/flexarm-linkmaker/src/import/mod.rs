@@ -145,7 +145,7 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
         check_apart(&targets.all(), &inputs)?;
         check_free(&targets.all(), targets.overwrite)?;
     }
-    let first = job.files.first().ok_or_else(|| LinkError::ImportJob("no file to import is given".into()))?;
+    let first = job.files.first().ok_or_else(|| LinkError::Job("no file to import is given".into()))?;
     let head = InputFile::open(first).map_err(Box::new)?;
     let (reduction, parts) = if recognise(&head.bytes) == Some(MatrixFormat::Sid) {
         expect_format(job, MatrixFormat::Sid, &head.origin)?;
@@ -174,7 +174,7 @@ fn expect_format(job: &ImportJob, found: MatrixFormat, origin: &str) -> Result<(
         found.name(),
         Setting::MatrixFormat
     );
-    Err(LinkError::file(origin, what))
+    Err(LinkError::content(origin, what))
 }
 
 /// What an import needs beside the matrices, from the job or else from the files.
@@ -399,8 +399,8 @@ fn rotation(rpy: &Vector3<f64>) -> Rotation3<f64> {
     Rotation3::from_euler_angles(rpy.x, rpy.y, rpy.z)
 }
 
-fn file_error(imported: &ImportedMatrices, what: impl Into<String>) -> LinkError {
-    LinkError::file(&imported.origin, what)
+fn file_error(imported: &ImportedMatrices, what: impl std::fmt::Display) -> LinkError {
+    LinkError::content(&imported.origin, what)
 }
 
 /// Frame of an interface, in the unit of the file.
@@ -428,10 +428,10 @@ fn place(
     for (k, at) in job.at.iter().enumerate() {
         if !names.contains(&at.name) {
             let what = format!("{} names interface {:?}, the map has {names:?}", Setting::At, at.name);
-            return Err(LinkError::ImportJob(what));
+            return Err(LinkError::Job(what));
         }
         if job.at[..k].iter().any(|other| other.name == at.name) {
-            return Err(LinkError::ImportJob(format!("{} {}=... is given twice", Setting::At, at.name)));
+            return Err(LinkError::Job(format!("{} {}=... is given twice", Setting::At, at.name)));
         }
     }
     let mut placed = Vec::new();
@@ -459,7 +459,7 @@ fn place(
     if (placed[0].xyz - placed[1].xyz).norm() == 0.0 {
         let [first, second] = [0, 1].map(|k| &names[k]);
         let what = format!("interfaces {first:?} and {second:?} are at the same point; a link needs a length");
-        return Err(LinkError::ImportJob(what));
+        return Err(LinkError::Job(what));
     }
     Ok(placed)
 }

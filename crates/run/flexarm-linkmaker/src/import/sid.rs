@@ -40,7 +40,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
     let p = |k: usize| places[k].translation.vector;
     let frame = |k: usize| InterfaceFrame { name: nodes[k].0.clone(), X_LI: places[k], tie: None };
     let K = static_stiffness(&sid, [nodes[0].1, nodes[1].1], &R_LM, &(p(1) - p(0)))
-        .map_err(|error| LinkError::file(&file.origin, error.to_string()))?;
+        .map_err(|what| LinkError::content(&file.origin, what))?;
     let element = Superelement { interfaces: vec![frame(0), frame(1)], K, M: DMatrix::zeros(12, 12) };
     let kind = if modal.is_some() { "modal link" } else { "static part" };
     let method = format!("{kind} of {} modes", sid.nq());
@@ -76,7 +76,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
 
 /// Returns the units of the file, and names and indices of the nodes, proximal and distal first.
 fn layout(job: &ImportJob, origin: &str, ids: &[i64]) -> Result<(UnitSystem, Vec<(String, usize)>), LinkError> {
-    let refuse = |what: String| LinkError::file(origin, what);
+    let refuse = |what: String| LinkError::content(origin, what);
     let mut faults = Vec::new();
     if job.units.is_none() {
         let units = Setting::Units;
@@ -84,56 +84,23 @@ fn layout(job: &ImportJob, origin: &str, ids: &[i64]) -> Result<(UnitSystem, Vec
     }
     let nodes = match &job.map {
         Some(map) => named_nodes(map, ids),
-        None => Err(NodeMapError::Missing { ids: ids.to_vec() }),
+        None => Err(format!(
+            "the nodes of interfaces A and B are not specified; the SID has nodes {ids:?}: {} \"A={},B={}\"",
+            Setting::Map,
+            ids.first().unwrap_or(&1),
+            ids.last().unwrap_or(&2)
+        )),
     };
-    let nodes = nodes.map_err(|error| faults.push(refuse(error.to_string()))).ok();
+    let nodes = nodes.map_err(|what| faults.push(refuse(what))).ok();
     let (Some(units), Some(nodes)) = (job.units, nodes) else { return Err(LinkError::of_all(faults)) };
     match job.at.first() {
         Some(given) => {
             let (at, name) = (Setting::At, &given.name);
             let what = format!("{at} {name}=...: the positions are in the SID file; leave {at} out");
-            Err(LinkError::ImportJob(what))
+            Err(LinkError::Job(what))
         }
         None => Ok((units, nodes)),
     }
-}
-
-/// Reason why a map does not name the nodes of the interfaces.
-#[derive(Debug, thiserror::Error)]
-enum NodeMapError {
-    #[error(
-        "the nodes of interfaces A and B are not specified; the SID has nodes {ids:?}: {} \"A={},B={}\"",
-        Setting::Map, ids.first().copied().unwrap_or(1), ids.last().copied().unwrap_or(2)
-    )]
-    Missing { ids: Vec<i64> },
-    #[error("a SID requires a map of at least two nodes, such as A=1,B=2; its nodes are {ids:?}")]
-    NoNodes { ids: Vec<i64> },
-    #[error("there is no node {node}; the nodes are {ids:?}")]
-    UnknownNode { node: i64, ids: Vec<i64> },
-    #[error("the map names node {node} twice")]
-    Twice { node: i64 },
-}
-
-/// Reason why a SID has no stiffness over the motions of two nodes.
-#[derive(Debug, thiserror::Error)]
-enum NoStiffness {
-    #[error("the compliance at B is singular")]
-    Singular,
-    #[error(
-        "has {modes} modes; the six relative motions of B require at least six, otherwise B is rigid in some \
-         direction: export more modes, including the static modes under loads at the interfaces"
-    )]
-    FewModes { modes: usize },
-    #[error("node {node} has no phi and psi of 3 x {modes}")]
-    NoShapes { node: i64, modes: usize },
-    #[error("Ke is not positive definite")]
-    Indefinite,
-    #[error(
-        "its {modes} modes do not move B relative to A in all six directions (minimum relative compliance \
-         {least:.1e}): are these nodes the interfaces, and does the file include the static modes under loads \
-         at them?"
-    )]
-    Incomplete { modes: usize, least: f64 },
 }
 
 /// Computes the stiffness of the free body over the motions of nodes A and B, in link axes.
@@ -142,8 +109,8 @@ fn static_stiffness(
     nodes: [usize; 2],
     R_LM: &Rotation3<f64>,
     p_AB: &Vector3<f64>,
-) -> Result<DMatrix<f64>, NoStiffness> {
-    let K_BB = compliance(sid, nodes, R_LM, p_AB)?.try_inverse().ok_or(NoStiffness::Singular)?;
+) -> Result<DMatrix<f64>, String> {
+    let K_BB = compliance(sid, nodes, R_LM, p_AB)?.try_inverse().ok_or("the compliance at B is singular")?;
     let K_BB = (K_BB + K_BB.transpose()) * 0.5;
     Ok(free_stiffness(&K_BB, p_AB))
 }
@@ -209,13 +176,13 @@ fn modal_link(
 }
 
 /// Returns names and indices of the nodes, proximal and distal first.
-fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, NodeMapError> {
-    let wrong = || NodeMapError::NoNodes { ids: ids.to_vec() };
+fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, String> {
+    let wrong = || format!("a SID requires a map of at least two nodes, such as A=1,B=2; its nodes are {ids:?}");
     let ImportMap::Rows(InterfaceMap { interfaces, modal }) = map else { return Err(wrong()) };
     let index = |picks: &[RowPick]| match picks {
         [RowPick::Node { node, first: 1, last: 6 }] => {
             let found = ids.iter().position(|id| id == node);
-            found.ok_or_else(|| NodeMapError::UnknownNode { node: *node, ids: ids.to_vec() })
+            found.ok_or_else(|| format!("there is no node {node}; the nodes are {ids:?}"))
         }
         _ => Err(wrong()),
     };
@@ -225,10 +192,10 @@ fn named_nodes(map: &ImportMap, ids: &[i64]) -> Result<Vec<(String, usize)>, Nod
     let nodes = interfaces
         .iter()
         .map(|one| Ok((one.name.clone(), index(&one.picks)?)))
-        .collect::<Result<Vec<(String, usize)>, NodeMapError>>()?;
+        .collect::<Result<Vec<(String, usize)>, String>>()?;
     let twice = nodes.iter().enumerate().find(|(k, (_, node))| nodes[..*k].iter().any(|(_, other)| other == node));
     match twice {
-        Some((_, (_, node))) => Err(NodeMapError::Twice { node: ids[*node] }),
+        Some((_, (_, node))) => Err(format!("the map names node {} twice", ids[*node])),
         None => Ok(nodes),
     }
 }
@@ -239,15 +206,18 @@ fn compliance(
     [a, b]: [usize; 2],
     R_LM: &Rotation3<f64>,
     p_AB: &Vector3<f64>,
-) -> Result<Matrix6<f64>, NoStiffness> {
+) -> Result<Matrix6<f64>, String> {
     let nq = sid.nq();
     if nq < 6 {
-        return Err(NoStiffness::FewModes { modes: nq });
+        return Err(format!(
+            "has {nq} modes; the six relative motions of B require at least six, otherwise B is rigid in some \
+             direction: export more modes, including the static modes under loads at the interfaces"
+        ));
     }
-    let shape = |k: usize| -> Result<DMatrix<f64>, NoStiffness> {
+    let shape = |k: usize| -> Result<DMatrix<f64>, String> {
         let (phi, psi) = (sid.nodes[k].phi.m0(), sid.nodes[k].psi.m0());
         if phi.shape() != (3, nq) || psi.shape() != (3, nq) {
-            return Err(NoStiffness::NoShapes { node: sid.nodes[k].id, modes: nq });
+            return Err(format!("node {} has no phi and psi of 3 x {nq}", sid.nodes[k].id));
         }
         let mut Phi = DMatrix::zeros(6, nq);
         Phi.view_mut((0, 0), (3, nq)).copy_from(&(R_LM.matrix() * phi));
@@ -263,7 +233,7 @@ fn compliance(
     let Ke = sid.Ke.m0();
     let scale = Ke.diagonal().map(|k| 1.0 / k.sqrt());
     let scaled = DMatrix::from_fn(nq, nq, |i, j| Ke[(i, j)] * scale[i] * scale[j]);
-    let factor = scaled.cholesky().ok_or(NoStiffness::Indefinite)?;
+    let factor = scaled.cholesky().ok_or("Ke is not positive definite")?;
     let right = DMatrix::from_fn(nq, 6, |i, j| P[(j, i)] * scale[i]);
     let C = right.transpose() * factor.solve(&right);
     // Motions missing in the modes appear as zero eigenvalues of the scaled compliance.
@@ -271,7 +241,11 @@ fn compliance(
     let unit = DMatrix::from_fn(6, 6, |i, j| C[(i, j)] * s[i] * s[j]);
     let least = unit.symmetric_eigenvalues().min();
     if least.is_nan() || least <= 1e-10 {
-        return Err(NoStiffness::Incomplete { modes: nq, least });
+        return Err(format!(
+            "its {nq} modes do not move B relative to A in all six directions (minimum relative compliance \
+             {least:.1e}): are these nodes the interfaces, and does the file include the static modes under loads \
+             at them?"
+        ));
     }
     Ok(Matrix6::from_fn(|i, j| C[(i, j)]))
 }

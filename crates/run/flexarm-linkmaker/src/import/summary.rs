@@ -139,7 +139,7 @@ impl ImportSummary {
         let gate = &link.checks;
         let masses = parts.element.as_ref().map(masses_along_axes);
         let mass_error = masses.map(|m| m.iter().map(|m| (m / whole.mass - 1.0).abs()).fold(0.0, f64::max));
-        let mut all = doubts(reduction, &parts.warnings, mass_error.zip(masses));
+        let mut all = findings(reduction, &parts.warnings, mass_error.zip(masses));
         let modal = modal_figures(link, &mut all);
         Self {
             link: link.name.clone(),
@@ -171,21 +171,21 @@ impl ImportSummary {
             wall_s: 0.0,
             cpu_s: 0.0,
             peak_rss_bytes: None,
-            warnings: all.iter().map(|doubt| doubt.message.clone()).collect(),
+            warnings: all.iter().map(|finding| finding.message.clone()).collect(),
             caveats: about(&link.name, all),
             files: ImportFiles::default(),
         }
     }
 }
 
-/// Returns the doubts about the files and the link.
+/// Returns the findings about the files and the link.
 ///
 /// * `mass`: relative error of the masses along x, y, z, and the masses (kg).
-fn doubts(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [f64; 3])>) -> Vec<Finding> {
-    let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, doubts } = reduction;
+fn findings(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [f64; 3])>) -> Vec<Finding> {
+    let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, findings } = reduction;
     let mut all: Vec<Finding> =
         warnings.iter().map(|sentence| Finding::warning("matrix-file", "", sentence, "")).collect();
-    all.extend(doubts.iter().cloned());
+    all.extend(findings.iter().cloned());
     if let Some((error, m)) = mass.filter(|(error, _)| error.is_nan() || *error > MASS_ERROR) {
         let sentence = format!("the mass matrix has {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
         all.push(Finding::warning("mass", "", sentence, "").measured(error, MASS_ERROR));
@@ -196,16 +196,16 @@ fn doubts(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [
     all
 }
 
-/// Returns the figures of the modal link, stored or made of the superelement; adds a doubt about
+/// Returns the figures of the modal link, stored or made of the superelement; adds a finding about
 /// the latter if its second-order terms are unknown.
-fn modal_figures(link: &ReducedLink, doubts: &mut Vec<Finding>) -> Option<ModalFigures> {
+fn modal_figures(link: &ReducedLink, findings: &mut Vec<Finding>) -> Option<ModalFigures> {
     let details = link.details.as_deref()?;
     if let Some(stored) = &details.modal {
         return Some(ModalFigures::from(stored));
     }
     let modal = ModalLink::from_superelement(&link.name, details.superelement.as_ref()?).ok()?;
     if !modal.has_second_order() {
-        doubts.push(Finding::warning("second-order", "", SECOND_ORDER_UNKNOWN, ""));
+        findings.push(Finding::warning("second-order", "", SECOND_ORDER_UNKNOWN, ""));
     }
     Some(ModalFigures::from(&modal))
 }

@@ -1,7 +1,7 @@
 //! Maps the interfaces of a job to nodes and frames of a mesh, with messages that contain the text
 //! to type.
 
-use flexarm_fem::mesh::{Seat, Surface, select};
+use flexarm_fem::mesh::{Surface, SurfaceNodes, select};
 use flexarm_fem::reduction::{Interface, Tie};
 use flexarm_fem::{Mesh, NodeSelector};
 use flexarm_settings::Setting;
@@ -20,7 +20,7 @@ pub(super) struct SelectedInterface {
     pub(super) centroid: Vector3<f64>,
     pub(super) extent: Vector3<f64>,
     /// Position of the chosen nodes on the surface.
-    pub(super) seat: Seat,
+    pub(super) on_surface: SurfaceNodes,
     /// Number of chosen nodes, before mid-side nodes were added.
     pub(super) chosen_nodes: usize,
 }
@@ -28,39 +28,39 @@ pub(super) struct SelectedInterface {
 impl SelectedInterface {
     /// Returns warnings about nodes that do not form a seat: corners without mid-side nodes, edges,
     /// nodes inside.
-    pub(super) fn seat_doubts(&self) -> Vec<String> {
-        let (name, seat, chosen) = (&self.interface.name, &self.seat, self.chosen_nodes);
-        let mut doubts = Vec::new();
-        if !seat.missing.is_empty() {
-            doubts.push(format!(
+    pub(super) fn node_warnings(&self) -> Vec<String> {
+        let (name, on_surface, chosen) = (&self.interface.name, &self.on_surface, self.chosen_nodes);
+        let mut findings = Vec::new();
+        if !on_surface.missing.is_empty() {
+            findings.push(format!(
                 "interface {name:?}: its {chosen} nodes include the corners of {} faces, but {} of the {} mid-side \
                  nodes of these faces are missing; they were added, because faces tied only at their corners make \
                  the link too soft; write node sets with all nodes of their faces",
-                seat.faces,
-                seat.missing.len(),
-                seat.middles
+                on_surface.faces,
+                on_surface.missing.len(),
+                on_surface.middles
             ));
         }
-        if seat.faces == 0 && seat.on_beams == 0 {
-            doubts.push(format!(
+        if on_surface.faces == 0 && on_surface.on_beams == 0 {
+            findings.push(format!(
                 "interface {name:?}: no face of the surface has all its corners among its {chosen} node(s), so it \
                  is an edge or single nodes, and the tied area depends on the mesh; select the nodes of a surface"
             ));
-        } else if 2 * seat.stray > chosen {
-            doubts.push(format!(
+        } else if 2 * on_surface.stray > chosen {
+            findings.push(format!(
                 "interface {name:?}: {} of its {chosen} nodes are on none of its {} faces; is the tolerance too \
                  small, or is the selector not on the surface?",
-                seat.stray, seat.faces
+                on_surface.stray, on_surface.faces
             ));
         }
-        if seat.inside > 0 {
-            doubts.push(format!(
+        if on_surface.inside > 0 {
+            findings.push(format!(
                 "interface {name:?}: {} of its {chosen} nodes are inside the body, where no joint is attached, and \
                  the material between them cannot deform; select nodes of the surface",
-                seat.inside
+                on_surface.inside
             ));
         }
-        doubts
+        findings
     }
 }
 
@@ -133,7 +133,7 @@ impl MeshFrame<'_> {
                 interface = Setting::Interface,
                 sets = self.known_sets()
             );
-            faults.push(LinkError::file(&job.mesh, what));
+            faults.push(LinkError::content(&job.mesh, what));
         }
         let surface = Surface::new(self.mesh);
         for (index, entry) in job.interface.iter().enumerate() {
@@ -164,9 +164,9 @@ impl MeshFrame<'_> {
             )));
         };
         let mut nodes = select(self.mesh, selector, self.unit).map_err(|source| fail(source.to_string()))?;
-        let (seat, chosen_nodes) = (surface.seat(&nodes), nodes.len());
+        let (on_surface, chosen_nodes) = (surface.surface_nodes(&nodes), nodes.len());
         // Tie whole faces: corners without mid-side nodes would hold a face only at points.
-        nodes.extend(&seat.missing);
+        nodes.extend(&on_surface.missing);
         nodes.sort_unstable();
         let (centroid, extent) = self.middle_and_extent(&nodes);
         if let Some(angle) = entry.rpy.iter().flatten().find(|angle| angle.abs() > std::f64::consts::TAU) {
@@ -189,7 +189,7 @@ impl MeshFrame<'_> {
                     let (urdf, link) = (Setting::Urdf, Setting::Link);
                     fail(format!("joint {joint:?} needs a robot: {urdf} FILE {link} NAME, or [urdf] in the job file"))
                 })?;
-                robot.joint(joint).map_err(|error| fail(error.to_string()))?
+                robot.joint(joint).map_err(fail)?
             }
             (None, None, None) => match (robot, index) {
                 (Some(_), 0) => Pose::identity(),
@@ -206,7 +206,7 @@ impl MeshFrame<'_> {
         };
         let tie = entry.tie.or(job.tie).unwrap_or(Tie::Rigid);
         let interface = Interface { name, X_LI, nodes, tie };
-        Ok(SelectedInterface { interface, selector: selector.clone(), centroid, extent, seat, chosen_nodes })
+        Ok(SelectedInterface { interface, selector: selector.clone(), centroid, extent, on_surface, chosen_nodes })
     }
 
     fn no_position(&self, name: &str, nodes: usize, centroid: &Vector3<f64>) -> String {
@@ -223,13 +223,13 @@ impl MeshFrame<'_> {
     }
 
     /// Returns warnings about positions that suggest a wrong unit or frame.
-    pub(super) fn doubts(&self, chosen: &[SelectedInterface]) -> Vec<String> {
+    pub(super) fn findings(&self, chosen: &[SelectedInterface]) -> Vec<String> {
         let size = self.mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).norm());
-        let mut doubts = Vec::new();
+        let mut findings = Vec::new();
         for one in chosen {
             let distance = (one.interface.X_LI.translation.vector - one.centroid).norm();
             if distance > 0.5 * size {
-                doubts.push(format!(
+                findings.push(format!(
                     "interface {:?} is {distance:.4} m from the centroid of its nodes, in a mesh of {size:.4} m: \
                      is its position in the unit of the mesh and in the link frame?",
                     one.interface.name
@@ -240,13 +240,13 @@ impl MeshFrame<'_> {
             let X = [a, b].map(|one| one.interface.X_LI.translation.vector);
             let (apart, nodes) = ((X[1] - X[0]).norm(), (b.centroid - a.centroid).norm());
             if apart < 0.05 * nodes {
-                doubts.push(format!(
+                findings.push(format!(
                     "interfaces {:?} and {:?} are {apart:.2e} m apart, the centroids of their nodes {nodes:.4} m: \
                      are the positions in the unit of the mesh?",
                     a.interface.name, b.interface.name
                 ));
             }
         }
-        doubts
+        findings
     }
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{NodeSelector, UnitSystem};
-use flexarm_files::Source;
+use flexarm_files::{FileError, Source};
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -180,7 +180,7 @@ impl ReduceJob {
                 }
                 _ => format!("cannot be read: {e}"),
             };
-            LinkError::file(path, what)
+            LinkError::Files(FileError::Unusable { path: path.to_owned(), what })
         };
         let mut bytes = Vec::new();
         // Reading a device may never end, opening a pipe may block.
@@ -192,7 +192,7 @@ impl ReduceJob {
         let is_toml = path.extension().is_some_and(|e| e == "toml");
         match std::str::from_utf8(&bytes) {
             Ok(text) if is_toml || is_job(text) => parse_job(text, path),
-            Err(_) if is_toml => Err(LinkError::file(path, "is not UTF-8 text, which a job file must be")),
+            Err(_) if is_toml => Err(LinkError::content(path, "is not UTF-8 text, which a job file must be")),
             _ => Ok(Self::for_mesh(path)),
         }
     }
@@ -302,8 +302,7 @@ pub fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
     let places: Places = toml::from_str(text).map_err(failed)?;
     for (entry, place) in job.interface.iter_mut().zip(places.interface) {
         let span = place.select.or(place.name).map_or(0..0, |value| value.span());
-        let at = source.error(span, "");
-        entry.place = format!("{}:{}:{}", path.display(), at.line, at.column);
+        entry.place = source.error(span, "").place().to_string();
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     job.file = Some(path.to_owned());

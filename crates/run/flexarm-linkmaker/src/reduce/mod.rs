@@ -36,11 +36,12 @@ use flexarm_fe_io::read_mesh;
 use flexarm_fem::mesh_link::ReductionStep;
 use flexarm_fem::stress::write_stress;
 use flexarm_fem::{UnitSystem, reduce_mesh, write_flex};
+use flexarm_settings::Setting;
 use flexarm_settings::finding::warnings;
 use flexarm_spatial::Pose;
 
 use crate::robot_entry::robot_entry;
-use crate::{JobError, LinkError, Stopwatch};
+use crate::{LinkError, Stopwatch};
 use files::Paths;
 use interfaces::MeshFrame;
 use prepare::{Prepared, failed, prepare, read};
@@ -127,7 +128,7 @@ impl Reduction {
         progress: &mut dyn FnMut(ReduceProgress),
     ) -> Result<ReduceSummary, LinkError> {
         let Self { job, paths, mesh, stopwatch } = self;
-        let Prepared { plan, file, units, chosen, materials, doubts } = prepare(&job, mesh, robot)?;
+        let Prepared { plan, file, units, chosen, materials, findings } = prepare(&job, mesh, robot)?;
         let read_s = stopwatch.wall_s();
 
         let mut starts = Vec::new();
@@ -140,7 +141,7 @@ impl Reduction {
         starts.push(stopwatch.wall_s());
 
         let mut summary = summary_of(&job, &plan, &file, units, &chosen, materials, &reduction);
-        let before = about(&summary.link, doubts);
+        let before = about(&summary.link, findings);
         summary.caveats.splice(0..0, before);
         summary.warnings = warnings(&summary.caveats);
         summary.phases = phases(read_s, &starts);
@@ -187,20 +188,23 @@ pub fn list_mesh(job: &ReduceJob) -> Result<MeshListing, LinkError> {
 }
 
 /// Returns the job with all defaults filled in.
-fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
+fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, LinkError> {
     let mut job = job.clone();
     job.put_over(ReduceJob::default()); // names the interfaces
     job.link = Some(job.link_name());
     match (job.modes, job.modes_up_to_hz) {
         (None, None) => job.modes = Some(MODES),
         (Some(_), Some(_)) => {
-            return Err(JobError::ModesTwice);
+            let what = "modes and modes_up_to_hz exclude each other: give one of them";
+            return Err(LinkError::Job(what.into()));
         }
         (Some(modes), None) if modes > MAX_MODES => {
-            return Err(JobError::TooManyModes { found: modes, most: MAX_MODES });
+            let what = format!("{} {modes}: at most {MAX_MODES} modes can be kept", Setting::Modes);
+            return Err(LinkError::Job(what));
         }
         (None, Some(hz)) if !(hz.is_finite() && hz > 0.0) => {
-            return Err(JobError::ModesUpTo(hz));
+            let what = format!("{} {hz}: a positive frequency in Hz is expected", Setting::ModesUpTo);
+            return Err(LinkError::Job(what));
         }
         _ => {}
     }
@@ -208,7 +212,7 @@ fn with_defaults(job: &ReduceJob) -> Result<ReduceJob, JobError> {
     chains.sort_unstable();
     chains.dedup();
     if let Some(parts) = chains.iter().find(|parts| !(2..=100).contains(*parts)) {
-        return Err(JobError::ChainParts(*parts));
+        return Err(LinkError::Job(format!("{} {parts}: a chain has 2 to 100 parts", Setting::Chains)));
     }
     job.geometric.get_or_insert(false);
     job.stress.get_or_insert(false);

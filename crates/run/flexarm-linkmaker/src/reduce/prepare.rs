@@ -19,7 +19,7 @@ use super::summary::{MaterialFigures, RegionFigures};
 use super::urdf_link::UrdfLink;
 use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
 use super::{JUDGED_MODES, MAX_MODES, MODES};
-use crate::{JobError, LinkError, stamp};
+use crate::{LinkError, stamp};
 
 /// Input of a reduction.
 pub(super) struct Prepared {
@@ -29,7 +29,7 @@ pub(super) struct Prepared {
     pub(super) units: UnitSystem,
     pub(super) chosen: Vec<SelectedInterface>,
     pub(super) materials: Vec<RegionFigures>,
-    pub(super) doubts: Vec<Finding>,
+    pub(super) findings: Vec<Finding>,
 }
 
 /// Reads the mesh of a job in its own axes, SI, with its nodes merged as the job requests; also
@@ -57,7 +57,7 @@ pub(super) fn prepare(
 ) -> Result<Prepared, LinkError> {
     if let Some(entry) = job.urdf.as_ref().filter(|_| robot.is_none()) {
         let what = "is the robot file of the job: its data for the link are required";
-        return Err(LinkError::file(&entry.file, what));
+        return Err(LinkError::content(&entry.file, what));
     }
     let units = units_of(job);
     let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| pose(&frame, units.length));
@@ -68,7 +68,11 @@ pub(super) fn prepare(
     }
     let materials = materials(job, &mut file, &mut faults, &mut warnings);
     if job.link_name().trim().is_empty() || job.link_name().contains(['/', '\\', '\n']) {
-        faults.push(JobError::LinkName(job.link_name()).into());
+        faults.push(LinkError::Job(format!(
+            "{:?} is not a valid link name: use one that can be part of a file name ({})",
+            job.link_name(),
+            Setting::Name
+        )));
     }
     // The reader's warning about a deck without sections does not apply if the job has the
     // material.
@@ -84,34 +88,34 @@ pub(super) fn prepare(
     {
         let names = [&a.interface.name, &b.interface.name];
         let what = format!("interfaces {names:?} are at the same point; a link needs a length");
-        faults.push(LinkError::file(&job.mesh, what));
+        faults.push(LinkError::content(&job.mesh, what));
     }
     if !faults.is_empty() {
         return Err(LinkError::of_all(faults));
     }
-    let doubt = |code: &'static str| move |sentence: String| Finding::warning(code, "", sentence, "");
-    let mut doubts: Vec<Finding> = warnings.into_iter().map(doubt("mesh-file")).collect();
-    doubts.extend(chosen.iter().flat_map(SelectedInterface::seat_doubts).map(doubt("interface-nodes")));
-    doubts.extend(place.doubts(&chosen).into_iter().map(doubt("interface-frame")));
-    doubts.extend(material_doubts(&file, units, &materials).into_iter().map(doubt("material")));
+    let finding = |code: &'static str| move |sentence: String| Finding::warning(code, "", sentence, "");
+    let mut findings: Vec<Finding> = warnings.into_iter().map(finding("mesh-file")).collect();
+    findings.extend(chosen.iter().flat_map(SelectedInterface::node_warnings).map(finding("interface-nodes")));
+    findings.extend(place.findings(&chosen).into_iter().map(finding("interface-frame")));
+    findings.extend(material_doubts(&file, units, &materials).into_iter().map(finding("material")));
     let mut plan = plan(job, &file, units, &chosen, &materials);
     plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
     if let (Some(robot), Some(entry)) = (robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
         let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
-        let mesh =
-            mass_properties(&file.mesh, &densities).map_err(|error| LinkError::file(&job.mesh, error.to_string()))?;
+        let mesh = mass_properties(&file.mesh, &densities)
+            .map_err(|error| LinkError::content(&job.mesh, error.to_string()))?;
         let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
-        plan.attached =
-            robot.rest(&mesh, &along).map_err(|error| LinkError::file(&entry.file, error.to_string()))?.into();
+        plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::content(&entry.file, what))?.into();
     }
-    Ok(Prepared { plan, file, units, chosen, materials, doubts })
+    Ok(Prepared { plan, file, units, chosen, materials, findings })
 }
 
 /// Merges coincident nodes.
 fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut Vec<String>) -> Result<(), LinkError> {
     if !(distance.is_finite() && distance >= 0.0) {
-        return Err(JobError::MergeDistance(distance).into());
+        let what = format!("merge = {distance}: a distance of zero or more, in the unit of the mesh");
+        return Err(LinkError::Job(what));
     }
     let merged = file.mesh.merge_coincident(distance * units.length);
     let before = file.mesh.nodes.len();
@@ -124,20 +128,20 @@ fn merge(file: &mut MeshFile, distance: f64, units: UnitSystem, warnings: &mut V
 
 /// Returns warnings about the materials in use, with the numbers as given.
 fn material_doubts(file: &MeshFile, units: UnitSystem, figures: &[RegionFigures]) -> Vec<String> {
-    let mut doubts: Vec<(String, Vec<&str>)> = Vec::new();
+    let mut findings: Vec<(String, Vec<&str>)> = Vec::new();
     for figure in figures {
         let region = file.mesh.regions.iter().find(|region| region.name == figure.region);
         let Some(material) = region.and_then(|region| region.material) else { continue };
         // Materials of a job are in SI, independent of the units of the mesh.
         let written = if figure.from == "mesh" { units } else { UnitSystem::SI };
-        for doubt in material.doubts(&written) {
-            match doubts.iter_mut().find(|(known, _)| *known == doubt) {
+        for finding in material.warnings(&written) {
+            match findings.iter_mut().find(|(known, _)| *known == finding) {
                 Some((_, regions)) => regions.push(&figure.region),
-                None => doubts.push((doubt, vec![&figure.region])),
+                None => findings.push((finding, vec![&figure.region])),
             }
         }
     }
-    doubts.into_iter().map(|(doubt, regions)| format!("material of {}: {doubt}", regions.join(", "))).collect()
+    findings.into_iter().map(|(finding, regions)| format!("material of {}: {finding}", regions.join(", "))).collect()
 }
 
 fn no_units(job: &ReduceJob, file: &MeshFile) -> LinkError {
@@ -148,7 +152,7 @@ fn no_units(job: &ReduceJob, file: &MeshFile) -> LinkError {
         1e-3 * size,
         setting = Setting::Units
     );
-    LinkError::file(&job.mesh, what)
+    LinkError::content(&job.mesh, what)
 }
 
 /// Assigns the materials of the job to the mesh; returns the material of each region.
@@ -158,7 +162,7 @@ fn materials(
     faults: &mut Vec<LinkError>,
     warnings: &mut Vec<String>,
 ) -> Vec<RegionFigures> {
-    let fault = |what: String| LinkError::file(&job.mesh, what);
+    let fault = |what: String| LinkError::content(&job.mesh, what);
     let mesh = &mut file.mesh;
     let names: Vec<&str> = mesh.regions.iter().map(|region| region.name.as_str()).collect();
     for name in job.materials.keys().filter(|name| !names.contains(&name.as_str())) {
@@ -295,7 +299,7 @@ fn quadrature(job: &ReduceJob, file: &MeshFile) -> Result<Quadrature, LinkError>
             let what = "the deck has C3D8I as well as C3D8 or C3D8R; the rules of CalculiX are available for \
                         bricks of one type only: use one type for all bricks, or omit quadrature, which gives all \
                         bricks incompatible modes";
-            Err(LinkError::file(&job.mesh, what))
+            Err(LinkError::content(&job.mesh, what))
         }
         QuadratureChoice::Calculix if has("C3D8I") => Ok(Quadrature::CalculixModes),
         QuadratureChoice::Calculix => Ok(Quadrature::Calculix),

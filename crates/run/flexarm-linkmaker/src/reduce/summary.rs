@@ -449,15 +449,15 @@ fn caveats_of(
     chosen: &[SelectedInterface],
     nodes: usize,
 ) -> Vec<Finding> {
-    let mut doubts = reduction.doubts.clone();
-    doubts.extend(first_mode.iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
-    doubts.extend(yardsticks::of_link(&reduction.link, &reduction.whole));
-    doubts.extend(spreads(chosen, nodes));
-    doubts.extend(chosen.iter().filter_map(|one| {
+    let mut findings = reduction.findings.clone();
+    findings.extend(first_mode.iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
+    findings.extend(yardsticks::of_link(&reduction.link, &reduction.whole));
+    findings.extend(spreads(chosen, nodes));
+    findings.extend(chosen.iter().filter_map(|one| {
         let off = (one.interface.X_LI.translation.vector - one.centroid).norm();
         yardsticks::of_point(&one.interface.name, off, one.extent.norm())
     }));
-    about(&reduction.link.name, doubts)
+    about(&reduction.link.name, findings)
 }
 
 /// Returns warnings about interfaces that extend over a large share of the distance between the two
@@ -504,8 +504,8 @@ pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Ve
 }
 
 /// Names the link in warnings about it.
-pub(crate) fn about(link: &str, doubts: Vec<Finding>) -> Vec<Finding> {
-    doubts.into_iter().map(|doubt| Finding { location: link.into(), ..doubt }).collect()
+pub(crate) fn about(link: &str, findings: Vec<Finding>) -> Vec<Finding> {
+    findings.into_iter().map(|finding| Finding { location: link.into(), ..finding }).collect()
 }
 
 pub(crate) fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {

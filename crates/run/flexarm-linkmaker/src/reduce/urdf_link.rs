@@ -1,7 +1,7 @@
 //! Data of the link from a robot file.
 
+use flexarm_fem::RigidPart;
 use flexarm_fem::matrix_link::halves_of_bar;
-use flexarm_fem::{FemError, RigidPart};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -31,23 +31,6 @@ pub struct LinkJoint {
     pub leads_on: bool,
 }
 
-/// Reason why a link of a robot lacks what a job takes from it.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "the messages say it")]
-pub enum UrdfLinkError {
-    #[error("link {link:?} has no <inertial>, so `rest` is undefined")]
-    NoInertia { link: String },
-    #[error(
-        "the mesh has {mesh:.4} kg, link {link:?} of the URDF {whole:.4} kg: no mass remains for attached bodies; omit \
-         `rest`, or correct the density"
-    )]
-    NoRest { link: String, mesh: f64, whole: f64 },
-    #[error("{0}: the mesh has more inertia than the link in the URDF; omit `rest`, or correct one of them")]
-    Inertia(FemError),
-    #[error("link {link:?} has no joint {joint:?}; its joints are {}", flexarm_settings::known_names(joint, known))]
-    UnknownJoint { link: String, joint: String, known: Vec<String> },
-}
-
 impl UrdfLink {
     /// Returns the name of the joint at B.
     pub(super) fn distal_joint(&self) -> Option<&str> {
@@ -58,13 +41,17 @@ impl UrdfLink {
     /// Returns the difference between the mass of the link and that of its mesh, as two halves
     /// along the line from A to B, in link axes.
     #[doc(hidden)]
-    pub fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], UrdfLinkError> {
+    pub fn rest(&self, mesh: &RigidPart, along: &Vector3<f64>) -> Result<[RigidPart; 2], String> {
         let Some(whole) = &self.inertia else {
-            return Err(UrdfLinkError::NoInertia { link: self.name.clone() });
+            return Err(format!("link {:?} has no <inertial>, so `rest` is undefined", self.name));
         };
         let mass = whole.mass - mesh.mass;
         if mass.is_nan() || mass <= 0.0 {
-            return Err(UrdfLinkError::NoRest { link: self.name.clone(), mesh: mesh.mass, whole: whole.mass });
+            return Err(format!(
+                "the mesh has {:.4} kg, link {:?} of the URDF {:.4} kg: no mass remains for attached bodies; omit \
+                 `rest`, or correct the density",
+                mesh.mass, self.name, whole.mass
+            ));
         }
         let com = (whole.com * whole.mass - mesh.com * mesh.mass) / mass;
         // Second moments about the centre of mass of the difference.
@@ -75,7 +62,10 @@ impl UrdfLink {
         let inertia = whole.inertia + about(whole.mass, whole.com) - mesh.inertia - about(mesh.mass, mesh.com);
         let halves = halves_of_bar(&RigidPart { mass, com, inertia }, along);
         for half in &halves {
-            half.check("the difference between link and mesh").map_err(UrdfLinkError::Inertia)?;
+            half.check("the difference between link and mesh").map_err(|error| {
+                let mend = "omit `rest`, or correct one of them";
+                format!("{error}: the mesh has more inertia than the link in the URDF; {mend}")
+            })?;
         }
         Ok(halves)
     }
@@ -88,13 +78,13 @@ impl UrdfLink {
 
     /// Returns the frame of a parent or child joint in the link.
     #[doc(hidden)]
-    pub fn joint(&self, name: &str) -> Result<Pose, UrdfLinkError> {
+    pub fn joint(&self, name: &str) -> Result<Pose, String> {
         // Child joints are searched before the parent joint.
         let found = self.leading_on().chain(&self.joints).find(|joint| joint.name == name);
-        found.map(|joint| joint.X_LJ).ok_or_else(|| UrdfLinkError::UnknownJoint {
-            link: self.name.clone(),
-            joint: name.to_owned(),
-            known: self.joints.iter().map(|joint| joint.name.clone()).collect(),
+        found.map(|joint| joint.X_LJ).ok_or_else(|| {
+            let known: Vec<String> = self.joints.iter().map(|joint| joint.name.clone()).collect();
+            let known = flexarm_settings::known_names(name, &known);
+            format!("link {:?} has no joint {name:?}; its joints are {known}", self.name)
         })
     }
 }

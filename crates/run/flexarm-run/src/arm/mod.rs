@@ -55,7 +55,7 @@ pub struct Arm {
     /// Torque-driven joints: coordinate, servo, torque limit.
     pub(crate) torque: Vec<(usize, ServoEntry, f64)>,
     /// Caveats about the models of the links.
-    pub doubts: Vec<Finding>,
+    pub findings: Vec<Finding>,
     /// Index in `spans` of the springs under the base; they are the last span.
     pub(crate) mounting: Option<usize>,
     /// Reach of the mass or of the TCP, used as a length scale (m).
@@ -209,7 +209,7 @@ impl Arm {
     pub fn link_caveats(&self) -> Vec<Finding> {
         let help = "write model = \"modal\" into the robot file";
         let instead = self.modal_instead.iter().map(|text| Finding::warning("third-interface", "links", text, help));
-        self.doubts.iter().cloned().chain(instead).collect()
+        self.findings.iter().cloned().chain(instead).collect()
     }
 
     /// Whether any joint is driven by torque.

@@ -48,7 +48,7 @@ impl Robot {
 
     /// As [`Robot::model`], without a copy of the robot.
     pub(crate) fn modelled(self: Arc<Self>, modelling: &Modelling) -> Result<Arm, Error> {
-        let ChosenLinks { links, doubts, modal_instead } = self.chosen_links(modelling)?;
+        let ChosenLinks { links, findings, modal_instead } = self.chosen_links(modelling)?;
         let mut substituted = substitute(&self.rigid, &links).map_err(refused)?;
         let bends = bends(&substituted);
         let gearboxes: Vec<Gearbox> =
@@ -77,7 +77,7 @@ impl Robot {
             friction,
             gears,
             torque,
-            doubts,
+            findings,
             mounting,
             extent: Size::of(&self.urdf.mechanism).extent.max(self.tcp.1.translation.vector.norm()),
             modal_instead,
@@ -94,8 +94,8 @@ impl Robot {
         for link in wanted {
             let (form, instead) = self.form_of(link, modelling)?;
             chosen.modal_instead.extend(instead);
-            chosen.doubts.extend(doubts_of(link, &form));
-            chosen.doubts.extend(lumping::of_parts(link, &form));
+            chosen.findings.extend(findings_of(link, &form));
+            chosen.findings.extend(lumping::of_parts(link, &form));
             chosen.links.push(FlexibleLink { form, ..link.flexible.clone() });
         }
         // An option that applies to no link is an error.
@@ -271,28 +271,28 @@ fn refused(error: impl std::fmt::Display) -> Error {
 #[derive(Default)]
 struct ChosenLinks {
     links: Vec<FlexibleLink>,
-    doubts: Vec<Finding>,
+    findings: Vec<Finding>,
     modal_instead: Vec<String>,
 }
 
 /// Returns the caveats about a link in this form.
-fn doubts_of(link: &RobotLink, form: &LinkForm) -> Vec<Finding> {
-    let mut doubts = Vec::new();
+fn findings_of(link: &RobotLink, form: &LinkForm) -> Vec<Finding> {
+    let mut findings = Vec::new();
     let is_modal = matches!(form, LinkForm::Modal(_));
     if is_modal && link.stress == Some(StressSource::Beam) {
-        doubts.push(kinds::NO_STRESS_OF_MODES.found(format!("link {:?}", link.flexible.link), 0.0, 0.0));
+        findings.push(kinds::NO_STRESS_OF_MODES.found(format!("link {:?}", link.flexible.link), 0.0, 0.0));
     }
     let link = &link.flexible;
     if matches!(form, LinkForm::Modal(modal) if !modal.has_second_order()) {
         let text = format!("link {:?}: {SECOND_ORDER_UNKNOWN}", link.link);
         let help = "reduce the mesh itself (flexarm reduce) to have them";
-        doubts.push(Finding::warning("second-order-unknown", "links", text, help));
+        findings.push(Finding::warning("second-order-unknown", "links", text, help));
     }
     if matches!(form, LinkForm::Chain(_)) && link.angles == ElasticAngles::EulerZyx {
         let text = format!("link {:?}: {EULER_CHAIN}", link.link);
-        doubts.push(Finding::warning("euler-chain", "links", text, "leave angles away: rotation vectors"));
+        findings.push(Finding::warning("euler-chain", "links", text, "leave angles away: rotation vectors"));
     }
-    doubts
+    findings
 }
 
 /// Spring with the group of elastic coordinates it acts on

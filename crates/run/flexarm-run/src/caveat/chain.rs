@@ -115,12 +115,12 @@ fn stiff_joints(robot: &Robot) -> Vec<Finding> {
     let last = chain.drain(..if outermost == 1 { 0 } else { outermost }).count();
     chain.retain(|(joint, _)| joint.kind.turns());
     let elastic = chain.iter().filter(|(_, yields)| *yields).count();
-    let odd: Vec<&Joint> = chain.iter().rev().filter(|(_, yields)| !yields).map(|(joint, _)| *joint).collect();
+    let rigid: Vec<&Joint> = chain.iter().rev().filter(|(_, yields)| !yields).map(|(joint, _)| *joint).collect();
     let all = chain.len() + last;
-    if all < FEWEST || odd.len() >= elastic {
+    if all < FEWEST || rigid.len() >= elastic {
         return Vec::new();
     }
     let all = all as f64;
     let caveat = |joint: &Joint| kinds::STIFF_JOINT.found(format!("joint {:?}", joint.name), elastic as f64, all);
-    odd.into_iter().map(caveat).collect()
+    rigid.into_iter().map(caveat).collect()
 }

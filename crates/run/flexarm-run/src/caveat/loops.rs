@@ -23,7 +23,7 @@ pub(crate) fn of_loops(rigid: &Model) -> Vec<Finding> {
     if rigid.loops().is_empty() {
         return Vec::new();
     }
-    let seen = over_ranges(rigid);
+    let behaviour = over_ranges(rigid);
     let mut caveats = Vec::new();
     for (k, own) in rigid.loops().iter().enumerate() {
         let name = name_of(&own.name);
@@ -31,11 +31,11 @@ pub(crate) fn of_loops(rigid: &Model) -> Vec<Finding> {
         if miss > ASSEMBLED {
             caveats.push(kinds::LOOP_ASSEMBLED.found(&name, miss, ASSEMBLED));
         }
-        if seen.open[k] > OPEN {
-            caveats.push(kinds::LOOP_RANGE.found(&name, 100.0 * seen.open[k], 100.0 * OPEN).as_note());
+        if behaviour.open[k] > OPEN {
+            caveats.push(kinds::LOOP_RANGE.found(&name, 100.0 * behaviour.open[k], 100.0 * OPEN).as_note());
         }
-        if seen.smallest[k] < TRANSMISSION[0] {
-            let degrees = seen.smallest[k].to_degrees();
+        if behaviour.smallest[k] < TRANSMISSION[0] {
+            let degrees = behaviour.smallest[k].to_degrees();
             caveats.push(kinds::LOOP_REACH.found(&name, degrees, TRANSMISSION[0].to_degrees()).as_note());
         }
     }
@@ -47,16 +47,16 @@ pub(crate) fn of_motion(trajectory: &Trajectory, rigid: &Model) -> Vec<Finding> 
     if rigid.loops().is_empty() {
         return Vec::new();
     }
-    let Ok(seen) = along_motion(rigid, trajectory) else { return Vec::new() };
+    let Ok(behaviour) = along_motion(rigid, trajectory) else { return Vec::new() };
     let mut caveats = Vec::new();
-    for (own, (angle, t)) in rigid.loops().iter().zip(&seen.smallest) {
+    for (own, (angle, t)) in rigid.loops().iter().zip(&behaviour.smallest) {
         if *angle < TRANSMISSION[0] {
             let place = format!("{} (at t = {t:.3} s)", name_of(&own.name));
             let caveat = kinds::LOOP_TRANSMISSION.found(place, angle.to_degrees(), TRANSMISSION[0].to_degrees());
             caveats.push(if *angle < TRANSMISSION[1] { caveat } else { caveat.as_note() });
         }
     }
-    for (c, [low, high]) in rigid.dependent().iter().zip(&seen.range) {
+    for (c, [low, high]) in rigid.dependent().iter().zip(&behaviour.range) {
         let passed =
             |kind: &FindingKind, value: f64, limit: f64| kind.found(format!("joint {:?}", c.joint), value, limit);
         if *high > c.limits.upper {

@@ -77,7 +77,7 @@ fn far(what: &str, distance: f64, size: &Size) -> Option<Finding> {
 fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item = Finding> + 'a {
     let length = |j: &Joint| j.X_PJ.translation.vector.norm();
     let all: f64 = mechanism.joints.iter().map(length).sum();
-    let odd = mechanism.joints.iter().filter_map(move |joint| {
+    let unusual = mechanism.joints.iter().filter_map(move |joint| {
         let (own, others) = (length(joint), all - length(joint));
         let sound = 0.0..=others.max(1.0);
         let is_far = own > LONGEST || (others > 1e-3 && own > MAX_DISTANCE_RATIO * others && own > FAR.1);
@@ -86,7 +86,7 @@ fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item
     });
     let long = || kinds::SIZE.found("the arm", size.extent, LONGEST);
     let long = (size.extent > LONGEST).then(|| long().likely(slip(size.extent, &(0.05..=30.0), slip::LENGTH, 1.0)));
-    odd.chain(long)
+    unusual.chain(long)
 }
 
 /// Checks masses and inertias: radius of gyration against the size of the arm, density against that

@@ -19,7 +19,7 @@ pub struct AppliedLoad {
     /// Start time (s), if there is one.
     pub start_s: Option<f64>,
     /// Caveats about the load as written.
-    pub(crate) doubts: Vec<Finding>,
+    pub(crate) findings: Vec<Finding>,
     /// Location in the file, if read from one.
     pub(crate) written: Option<LoadLocation>,
 }
@@ -27,7 +27,7 @@ pub struct AppliedLoad {
 impl AppliedLoad {
     /// Returns a load with a wrench at the origin of a frame: `tcp`, or a link that moves.
     pub fn new(frame: &str, wrench: TimedWrench) -> Self {
-        Self { frame: frame.to_owned(), wrench, start_s: None, doubts: Vec::new(), written: None }
+        Self { frame: frame.to_owned(), wrench, start_s: None, findings: Vec::new(), written: None }
     }
 
     /// Sets the start time (s); a load that starts after the run gives a caveat.

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use exmex::{Express, FlatEx};
-use flexarm_files::{Source, TextFileError as RobotFileError, named_file, read_text};
+use flexarm_files::{NumberTable, Source, TextFileError as RobotFileError, named_file, read_text};
 use flexarm_kinematics::{LinkInertia, Wrench};
 use flexarm_stepping::{LoadAxes, TimedWrench};
 use nalgebra::{Matrix3, Vector3};
@@ -183,7 +183,7 @@ fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Sourc
     let written = LoadLocation::new(source, entry.span(), e.frame.as_ref().map(Spanned::span), None);
     let load =
         AppliedLoad::new(name, TimedWrench { axes, value, jumps, stops: Vec::new(), period }).starting_at(e.start);
-    Ok(AppliedLoad { written: Some(written), doubts: doubts(e), ..load })
+    Ok(AppliedLoad { written: Some(written), findings: findings(e), ..load })
 }
 
 fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFileError> {
@@ -200,7 +200,7 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
 
 /// Caveats about angles that look like degrees (the phase of a sine, arguments of sin and cos in
 /// expressions), impulses and spindle speeds.
-fn doubts(e: &LoadEntry) -> Vec<Finding> {
+fn findings(e: &LoadEntry) -> Vec<Finding> {
     let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
     let number = |value: &Option<Spanned<f64>>| value.as_ref().map(|value| *value.get_ref());
     let [pulse, spindle] = [&e.duration, &e.spindle_rpm].map(number);
@@ -431,40 +431,31 @@ fn span_or<T, E>(value: Option<&Spanned<T>>, entry: &Spanned<E>) -> Range<usize>
 
 /// Reads a CSV table: linear between rows, zero outside; also returns the times of its kinks.
 fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
-    let fail = |what: String| Error::File { path: path.to_owned(), what };
-    let text = read_text(path)?;
-    let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
-    let header: Vec<String> =
-        lines.next().map(|(_, l)| l.split(',').map(|w| w.trim().to_owned()).collect()).unwrap_or_default();
     const NAMES: [&str; 7] = ["time", "fx", "fy", "fz", "tx", "ty", "tz"];
-    if header.first().is_none_or(|h| h != "time") || header.iter().any(|h| !NAMES.contains(&h.as_str())) {
-        return Err(fail(format!("the header is {header:?}, expected time and some of fx, fy, fz, tx, ty, tz")));
+    let table = NumberTable::read(path)?;
+    let header = &table.names;
+    if header[0] != "time" || header.iter().any(|name| !NAMES.contains(&name.as_str())) {
+        let message = format!("the header is {header:?}, expected time and some of fx, fy, fz, tx, ty, tz");
+        return Err(table.error(None, message).into());
     }
-    let earlier = |k: usize| header[..k].iter().position(|name| *name == header[k]);
-    if let Some((k, first)) = (0..header.len()).find_map(|k| Some((k, earlier(k)?))) {
-        let (name, first, second) = (&header[k], first + 1, k + 1);
-        let mend = "remove or rename one of them";
-        return Err(fail(format!("the header names {name:?} twice, in columns {first} and {second}: {mend}")));
+    if table.rows.len() < 2 {
+        return Err(table.error(None, "a table of loads needs at least two rows").into());
     }
     let mut rows: Vec<(f64, [f64; 6])> = Vec::new();
-    for (number, line) in lines {
-        let values: Vec<f64> = line.split(',').map_while(|w| w.trim().parse().ok()).collect();
-        if values.len() != header.len() || values.iter().any(|x| !x.is_finite()) {
-            return Err(fail(format!("line {}: expected {} finite numbers, found {line:?}", number + 1, header.len())));
+    for (k, values) in table.rows.iter().enumerate() {
+        if let Some(empty) = values.iter().position(|value| value.is_nan()) {
+            return Err(table.error(Some(k), format!("column {:?} is empty, expected a number", header[empty])).into());
+        }
+        if rows.last().is_some_and(|(t, _)| *t >= values[0]) {
+            return Err(table.error(Some(k), format!("time {} s does not rise: sort the rows", values[0])).into());
         }
         let mut row = [0.0; 6];
-        for (name, value) in header.iter().zip(&values).skip(1) {
+        for (name, value) in header.iter().zip(values).skip(1) {
             if let Some(k) = NAMES.iter().position(|n| n == name) {
                 row[k - 1] = *value;
             }
         }
-        if rows.last().is_some_and(|(t, _)| *t >= values[0]) {
-            return Err(fail(format!("line {}: time {} does not rise", number + 1, values[0])));
-        }
         rows.push((values[0], row));
-    }
-    if rows.len() < 2 {
-        return Err(fail("a table of loads needs at least two rows".into()));
     }
     let bends = if rows.len() <= MAX_ROWS { &rows[..] } else { &[rows[0], rows[rows.len() - 1]][..] };
     let bends = bends.iter().map(|(t, _)| *t).collect();

@@ -52,7 +52,7 @@ pub struct HeldJoint {
     /// Position at which it is held (rad or m).
     pub at: f64,
     /// Whether the position is given in the robot file.
-    pub told: bool,
+    pub given: bool,
 }
 
 struct AlongTrajectory(Arc<Trajectory>);
@@ -176,22 +176,19 @@ impl Motion {
         let dependent: Vec<&str> = model.dependent().iter().map(|c| c.joint.as_str()).collect();
         let moved: Vec<String> = trajectory.joints().iter().chain(trajectory.dropped_columns()).cloned().collect();
         refuse_dependent(path, &moved, &names, &dependent)?;
-        let dropped = foreign_joints(trajectory.joints(), &names)
-            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        let dropped = foreign_joints(trajectory.joints(), &names).map_err(|e| Error::motion(path, e.to_string()))?;
         let trajectory = trajectory.without_joints(&dropped);
         let warnings = warnings(&trajectory, path);
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
         let place = |c: &Coordinate| {
-            let told = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
-            let at = told.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper));
-            HeldJoint { joint: c.joint.clone(), at, told: told.is_some() }
+            let given = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+            let at = given.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper));
+            HeldJoint { joint: c.joint.clone(), at, given: given.is_some() }
         };
         let held: Vec<HeldJoint> = still.map(place).collect();
         let named_held: Vec<(&str, f64)> = held.iter().map(|held| (held.joint.as_str(), held.at)).collect();
         let trajectory = trajectory.with_held_joints(&named_held)?;
-        let trajectory = trajectory
-            .with_joint_order(&names)
-            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
+        let trajectory = trajectory.with_joint_order(&names).map_err(|e| Error::motion(path, e.to_string()))?;
         let violations = trajectory.check_limits(&limits);
         let likely = caveat::motion::degrees(&violations, model);
         let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
@@ -247,8 +244,8 @@ impl Motion {
     /// Returns the caveats about the motion.
     pub fn caveats(&self) -> Vec<Finding> {
         let file = self.path.display().to_string();
-        let told = self.warnings.iter().map(|text| Finding::warning("trajectory", &file, text, ""));
-        self.notes.iter().cloned().chain(self.dropped_caveat()).chain(told).chain(self.held_note()).collect()
+        let given = self.warnings.iter().map(|text| Finding::warning("trajectory", &file, text, ""));
+        self.notes.iter().cloned().chain(self.dropped_caveat()).chain(given).chain(self.held_caveats()).collect()
     }
 
     fn dropped_caveat(&self) -> Option<Finding> {
@@ -261,8 +258,8 @@ impl Motion {
 
     /// Caveats about held joints: a note for positions given in the robot file, a warning for
     /// assumed ones.
-    fn held_note(&self) -> Vec<Finding> {
-        let (told, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.told);
+    fn held_caveats(&self) -> Vec<Finding> {
+        let (given, assumed): (Vec<&HeldJoint>, Vec<&HeldJoint>) = self.held.iter().partition(|held| held.given);
         let file = self.path.display().to_string();
         let note = |held: &[&HeldJoint], end: &str| {
             let places: Vec<String> = held.iter().map(|held| format!("{:?} at {}", held.joint, held.at)).collect();
@@ -272,8 +269,8 @@ impl Motion {
         };
         let assumed =
             (!assumed.is_empty()).then(|| note(&assumed, " ([hold] in the robot file says where, in rad or m)"));
-        let told = (!told.is_empty()).then(|| note(&told, "").as_note());
-        assumed.into_iter().chain(told).collect()
+        let given = (!given.is_empty()).then(|| note(&given, "").as_note());
+        assumed.into_iter().chain(given).collect()
     }
 
     /// Returns the motion in the form that steppers use.

@@ -143,7 +143,7 @@ pub(crate) fn read(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     let head = Head { ending: &ending, bytes: &bytes, text: &decoded, is_folder };
     match FORMATS.iter().find(|format| (format.recognises)(&head)) {
         Some(format) => (format.read)(file),
-        None => Err(Error::File { path: path.to_owned(), what: unknown(&head) }),
+        None => Err(Error::motion(path, unknown(&head))),
     }
 }
 
@@ -253,15 +253,14 @@ fn robot_program(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
 }
 
 fn along((trajectory, tool_path): (Trajectory, ToolPath), format: String) -> ReadMotion {
-    let (samples, caveats) = (None, tool_path.caveats());
+    let (samples, caveats) = (None, tool_path.caveats.clone());
     ReadMotion { trajectory, format, topic: None, samples, dropped: Vec::new(), caveats, tool_path: Some(tool_path) }
 }
 
 /// Returns the robot; a TCP path without one does not determine a joint motion.
 fn robot_of<'a>(file: &MotionFile<'a>) -> Result<&'a Cell<'a>, Error> {
     file.cell.ok_or_else(|| {
-        let what = "this file gives a TCP path: give the robot as well, whose joints follow it".into();
-        Error::File { path: file.path.to_owned(), what }
+        Error::motion(file.path, "this file gives a TCP path: give the robot as well, whose joints follow it")
     })
 }
 
@@ -292,7 +291,7 @@ fn bag_of_ros_1(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     let what = "this is a bag of ROS 1; readable are bags of ROS 2 as MCAP or SQLite. rosbags-convert (pip install \
                 rosbags) makes one of it: rosbags-convert --src FILE.bag --dst FOLDER --dst-storage mcap; then give \
                 the folder";
-    Err(Error::File { path: file.path.to_owned(), what: what.to_owned() })
+    Err(Error::motion(file.path, what))
 }
 
 fn bag(
@@ -322,7 +321,7 @@ fn no_topic(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
                 "{} {topic:?} was requested, but the file is {what}, which has no topics; leave it out",
                 Setting::Topic
             );
-            Err(Error::File { path: file.path.to_owned(), what })
+            Err(Error::motion(file.path, what))
         }
     }
 }
@@ -332,7 +331,7 @@ fn no_columns(file: &MotionFile<'_>, what: &str) -> Result<(), Error> {
         return Ok(());
     }
     let what = format!("{} names the columns of a table, but the file is {what}; leave it out", Setting::Columns);
-    Err(Error::File { path: file.path.to_owned(), what })
+    Err(Error::motion(file.path, what))
 }
 
 /// Rejects a motion of joints that follow from closed loops.
@@ -350,5 +349,5 @@ pub(crate) fn refuse_dependent(
         "the motion moves {follows:?}, which follow from closed loops of the robot: a motion names the joints that drive, {joints:?}; leave \
          the others out"
     );
-    Err(Error::File { path: path.to_owned(), what })
+    Err(Error::motion(path, what))
 }

@@ -485,7 +485,7 @@ impl Target {
                      (trajectory_msgs/JointTrajectory), .svg (curves); found {ending:?}",
                     Setting::Output
                 );
-                Err(Error::File { path: path.to_owned(), what })
+                Err(Error::Value(format!("{}: {what}", path.display())))
             }
         }
     }
@@ -494,8 +494,8 @@ impl Target {
     fn of_motion(path: &Path) -> Result<Self, Error> {
         match Self::of(path)? {
             Self::Plot => {
-                let what = "a motion is written as .csv, .toml, .yaml or .json; found .svg".into();
-                Err(Error::File { path: path.to_owned(), what })
+                let what = "a motion is written as .csv, .toml, .yaml or .json; found .svg";
+                Err(Error::Value(format!("{}: {what}", path.display())))
             }
             target => Ok(target),
         }
@@ -574,5 +574,5 @@ fn plot(report: &MotionReport, trajectory: &Trajectory, torques: &Torques) -> Re
     let mut notes = vec![format!("{}, {:.4} s", report.format, report.duration_s)];
     notes.extend(report.tcp_length_m.map(|length| format!("path of the tool {length:.4} m")));
     let plot = LinePlot { title: &title, notes: &notes, x_label: "time [s]", panels: &panels, ..LinePlot::default() };
-    plot.svg().map_err(|error| Error::File { path: report.motion.clone().into(), what: error.to_string() })
+    plot.svg().map_err(|error| Error::motion(report.motion.as_ref(), error.to_string()))
 }

@@ -110,7 +110,7 @@ impl Scenario {
         let mut acting = Disturbances::default();
         for load in &self.loads {
             acting.loads.push(load.on(model, duration)?);
-            acting.caveats.extend(load.doubts.iter().cloned());
+            acting.caveats.extend(load.findings.iter().cloned());
             // Tables, samples and impulses have a definite end; other loads may continue.
             if load.wrench.jumps.len() > 2 {
                 let last = load.wrench.jumps.iter().fold(0.0, |last: f64, t| last.max(*t));

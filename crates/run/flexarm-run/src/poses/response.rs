@@ -472,7 +472,7 @@ pub fn readable_unit(unit: &str) -> (String, f64) {
 /// the natural frequencies.
 fn plot(response: &Response) -> Result<String, PlotError> {
     // Motion in the direction of its force has the colour of that axis.
-    let look = |c: &ResponseCurve| {
+    let style = |c: &ResponseCurve| {
         let direction = WRENCH.iter().position(|word| *word == c.input);
         match direction.filter(|k| AXES[*k] == c.output) {
             Some(k) => CurveLook::Axis(k % 3),
@@ -482,7 +482,7 @@ fn plot(response: &Response) -> Result<String, PlotError> {
     };
     let curve = |c: &ResponseCurve, y: Vec<f64>| PlotCurve {
         name: format!("{} to {}", c.input, c.output),
-        look: look(c),
+        look: style(c),
         x: response.frequency_hz.clone(),
         y,
     };

@@ -128,7 +128,7 @@ pub fn convert_until(
 pub(crate) fn no_sample(path: &Path, why: Option<&String>) -> Error {
     let mend = why.cloned().unwrap_or_else(|| "the run that should write it recorded nothing".into());
     let (path, found, expected) = (path.to_owned(), "no sample".into(), "at least one".into());
-    LogError::NotARecording { path, found, expected, mend }.into()
+    LogError::NotARecording { path, line: None, found, expected, mend }.into()
 }
 
 /// Reads a recording into memory: its summary, if it contains one (MCAP and tables with texts), its

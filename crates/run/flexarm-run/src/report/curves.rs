@@ -262,13 +262,13 @@ fn amplitudes(errors: &[(f64, [f64; 3])]) -> Option<(Vec<f64>, Vec<Curve>)> {
     }
     // Zero cannot be drawn on a logarithmic axis; amplitudes are cut off six decades below the
     // peak.
-    let seen = |a: f64| a.max(1e-6 * largest);
+    let clipped = |a: f64| a.max(1e-6 * largest);
     let mut curves =
-        vec![Curve { name: "all axes".into(), kind: Kind::Total, y: total.into_iter().map(seen).collect() }];
+        vec![Curve { name: "all axes".into(), kind: Kind::Total, y: total.into_iter().map(clipped).collect() }];
     curves.extend(["x", "y", "z"].iter().enumerate().map(|(k, name)| Curve {
         name: (*name).into(),
         kind: Kind::Axis(k),
-        y: spectrum.amplitude.iter().map(|a| seen(a[k])).collect(),
+        y: spectrum.amplitude.iter().map(|a| clipped(a[k])).collect(),
     }));
     Some((spectrum.hz, curves))
 }

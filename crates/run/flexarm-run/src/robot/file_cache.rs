@@ -55,15 +55,16 @@ impl FileCache {
     /// Reads the stress fields of a link, or returns the cached ones.
     ///
     /// # Errors
-    /// [`Error::File`] for a file that cannot be read or is damaged.
+    /// [`Error::File`] for a file that cannot be read, [`Error::Modelling`] for one that is damaged.
     pub(crate) fn stress(&self, path: &Path) -> Result<Arc<StressFields>, Error> {
         let known = self.stresses.lock().unwrap_or_else(PoisonError::into_inner).get(path).cloned();
         if let Some(known) = known {
             return Ok(known);
         }
-        let fail = |what: String| Error::File { path: path.to_owned(), what };
-        let bytes = std::fs::read(path).map_err(|error| fail(error.to_string()))?;
-        let read = Arc::new(parse_stress(&bytes).map_err(|error| fail(error.to_string()))?);
+        let unreadable = |error: std::io::Error| Error::File { path: path.to_owned(), what: error.to_string() };
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let wrong = |error| Error::Modelling(format!("{}: {error}", path.display()));
+        let read = Arc::new(parse_stress(&bytes).map_err(wrong)?);
         self.stresses.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned(), read.clone());
         Ok(read)
     }

@@ -211,7 +211,7 @@ fn stored_link(
     }
     warnings.extend(reduced.warnings(&Default::default()).into_iter().map(|w| format!("link {name:?}: {w}")));
     let order = reduced.details.as_ref().and_then(|details| details.gate.as_ref()?.order);
-    let stiff = order.and_then(|order| order.doubt()).map(|doubt| format!("link {name:?}: its mesh: {doubt}"));
+    let stiff = order.and_then(|order| order.warning()).map(|warning| format!("link {name:?}: its mesh: {warning}"));
     warnings.extend(stiff);
     Ok(reduced)
 }
@@ -315,11 +315,11 @@ fn matrix6(
     }
     let size = |i: usize, j: usize| (K[(i, i)] * K[(j, j)]).sqrt();
     let pairs = || (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j)));
-    let odd = |(i, j): &(usize, usize)| {
+    let is_asymmetric = |(i, j): &(usize, usize)| {
         let apart = (K[(*i, *j)] - K[(*j, *i)]).abs();
         apart.is_nan() || apart > SYMMETRIC * size(*i, *j)
     };
-    if let Some((i, j)) = pairs().find(odd) {
+    if let Some((i, j)) = pairs().find(is_asymmetric) {
         let (a, b) = (K[(i, j)], K[(j, i)]);
         return fail(format!("[{i}][{j}] is {a} and [{j}][{i}] is {b}: it must be symmetric"));
     }
@@ -375,8 +375,8 @@ fn beam_link(
     let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
     let (section, material): (Section, Material) = beam_section(beam).map_err(|error| fail(error.to_string()))?;
     if beam.material.is_some() {
-        let doubts = material.doubts(&UnitSystem::SI).into_iter();
-        warnings.extend(doubts.map(|doubt| format!("link {name:?}: {doubt}")));
+        let of_material = material.warnings(&UnitSystem::SI).into_iter();
+        warnings.extend(of_material.map(|warning| format!("link {name:?}: {warning}")));
     }
     let theory = beam.theory().map_err(|error| fail(error.to_string()))?;
     let [from, to] = beam.ends.map_or([Vector3::zeros(), X_LB.translation.vector], |ends| ends.map(Vector3::from));

@@ -67,7 +67,8 @@ pub(crate) fn add_loops(robot: &mut Robot, entries: &[Spanned<LoopEntry>], sourc
     if faults.len() == before
         && let Err(fault) = robot.check_loops()
     {
-        let place = places.iter().find(|(name, _)| fault.name() == name).map_or(0..0, |(_, place)| place.clone());
+        let is_it = |name: &String| matches!(&fault, Error::Loop { name: own, .. } if own == name);
+        let place = places.iter().find(|(name, _)| is_it(name)).map_or(0..0, |(_, place)| place.clone());
         faults.push(source.error(place, fault.to_string()).into());
     }
 }

@@ -4,12 +4,13 @@
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LoopClosure, Mechanism, Model, ModelError, Pose, forward_kinematics,
 };
+use flexarm_settings::known_names;
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Rotation3, Unit, Vector3};
 use serde::Serialize;
 
 use crate::caveat::size::spread_poses;
-use crate::error::LoopError;
+use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot::entry_checks::loop_of_joint;
 
@@ -66,16 +67,18 @@ impl Robot {
     /// Adds closed loops to the robot.
     ///
     /// # Errors
-    /// [`LoopError`] for unknown links and joints, values that are not finite, a duplicate name,
+    /// [`Error::Loop`] for unknown links and joints, values that are not finite, a duplicate name,
     /// loops that are not planar, do not close or are at a dead point where they are assembled, and
     /// joints that have a drive.
-    pub fn with_loops(mut self, loops: Vec<RobotLoop>) -> Result<Self, LoopError> {
+    pub fn with_loops(mut self, loops: Vec<RobotLoop>) -> Result<Self, Error> {
         for own in loops {
             self.add_loop(own)?;
         }
         if let Some(drive) = self.drives.iter().find(|drive| loop_of_joint(&self.rigid, &drive.joint).is_some()) {
             let name = loop_of_joint(&self.rigid, &drive.joint).unwrap_or_default().to_owned();
-            return Err(LoopError::Driven { name, joint: drive.joint.clone() });
+            let what =
+                format!("joint {:?} has a drive and follows from the loop: only one of both moves it", drive.joint);
+            return Err(Error::Loop { name, what });
         }
         self.check_loops()?;
         Ok(self)
@@ -83,26 +86,38 @@ impl Robot {
 
     /// Adds a loop. The frames of pin and eye are fixed to their links, so that on a flexible link
     /// each moves with the part it is on.
-    pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), LoopError> {
+    pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), Error> {
         let RobotLoop { name, pin, axis, eye, dependent, at } = own;
         if self.rigid.loops.iter().any(|other| other.name == name) {
-            return Err(LoopError::Twice { name });
+            return Err(Error::Loop { name, what: "it is defined twice: names must be unique".into() });
         }
         for (link, place) in [&pin, &eye] {
             if self.rigid.link(link).is_none() {
-                let known = self.rigid.links.iter().map(|l| l.name.clone()).filter(|l| !l.starts_with("__")).collect();
-                return Err(LoopError::UnknownLink { name, link: link.clone(), known });
+                let links = self.rigid.links.iter().map(|l| l.name.clone());
+                let known: Vec<String> = links.filter(|l| !l.starts_with("__")).collect();
+                let known = known_names(link, &known);
+                let what = format!("{link:?} is not a link of the robot; its links are {known}");
+                return Err(Error::Loop { name, what });
             }
             if let Some(value) = place.iter().find(|x| !x.is_finite()) {
-                return Err(LoopError::NotFinite { name, what: format!("its point on link {link:?}"), value: *value });
+                let what = format!("its point on link {link:?} has the entry {value}, expected finite numbers");
+                return Err(Error::Loop { name, what });
             }
         }
         let axis = match axis {
-            None => axis_of_joint(&self.rigid, &pin.0, &dependent)
-                .ok_or_else(|| LoopError::NoAxis { name: name.clone() })?,
+            None => axis_of_joint(&self.rigid, &pin.0, &dependent).ok_or_else(|| Error::Loop {
+                name: name.clone(),
+                what:
+                    "none of its dependent joints turns, so that its pin needs an axis: give axis = [x, y, z] in axes \
+                       of the pin's link"
+                        .into(),
+            })?,
             Some(axis) => Unit::try_new(Vector3::from(axis), 1e-9)
                 .filter(|axis| axis.iter().all(|x| x.is_finite()))
-                .ok_or_else(|| LoopError::BadAxis { name: name.clone(), axis })?,
+                .ok_or_else(|| Error::Loop {
+                    name: name.clone(),
+                    what: format!("axis is {axis:?}, expected the direction of the pin in axes of its link"),
+                })?,
         };
         let frames = ["pin", "eye"].map(|end| format!("__loop_{name}_{end}"));
         for ((link, place), frame) in [pin, eye].into_iter().zip(&frames) {
@@ -116,9 +131,9 @@ impl Robot {
     }
 
     /// Checks that all loops close.
-    pub(crate) fn check_loops(&self) -> Result<(), LoopError> {
+    pub(crate) fn check_loops(&self) -> Result<(), Error> {
         match Model::new(&self.rigid) {
-            Err(ModelError::BadLoop { name, what }) => Err(LoopError::Unfit { name, what }),
+            Err(ModelError::BadLoop { name, what }) => Err(Error::Loop { name, what }),
             _ => Ok(()),
         }
     }
@@ -204,15 +219,24 @@ pub(crate) fn over_ranges(model: &Model) -> OverRanges {
 /// Checks that all loops close at these joint values (rad or m).
 ///
 /// # Errors
-/// [`LoopError::Open`] with the first loop that does not close.
-pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), LoopError> {
+/// [`Error::Loop`] with the first loop that does not close.
+pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Result<(), Error> {
     if model.loops().is_empty() {
         return Ok(());
     }
     forward_kinematics(model, data, q);
-    data.open_loop().map_or(Ok(()), |k| Err(LoopError::Open { name: model.loops()[k].name.clone() }))
+    match data.open_loop() {
+        None => Ok(()),
+        Some(k) => Err(Error::Loop { name: model.loops()[k].name.clone(), what: OPEN.into() }),
+    }
 }
 
+/// Message about a loop whose links do not reach each other.
+const OPEN: &str = "it does not close there: its links do not reach each other; keep the driving joints within the range \
+                    of its bars, or check their lengths";
+/// Message about a loop whose links are in line.
+const DEAD_POINT: &str = "it passes its dead point there: its links are collinear and could continue in two ways; keep \
+                          the motion away from it";
 /// Number of time intervals at which a motion is checked.
 const TIMES: usize = 1000;
 
@@ -228,15 +252,15 @@ pub struct AlongMotion {
 /// assembly mode is ambiguous.
 ///
 /// # Errors
-/// [`LoopError::AlongMotion`].
-pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotion, LoopError> {
+/// [`Error::Loop`] with the time at which a loop does not close or passes a dead point.
+pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotion, Error> {
     let (n, loops) = (model.nv(), model.loops().len());
-    let mut seen = AlongMotion {
+    let mut found = AlongMotion {
         smallest: vec![(f64::INFINITY, 0.0); loops],
         range: vec![[f64::INFINITY, f64::NEG_INFINITY]; model.dependent().len()],
     };
     if loops == 0 {
-        return Ok(seen);
+        return Ok(found);
     }
     let (mut data, mut q, mut v, mut a) = (Data::new(model), DVector::zeros(n), vec![0.0; n], vec![0.0; n]);
     // Angles at the last two times.
@@ -244,22 +268,28 @@ pub fn along_motion(model: &Model, trajectory: &Trajectory) -> Result<AlongMotio
     for i in 0..=TIMES {
         let t = trajectory.duration() * i as f64 / TIMES as f64;
         trajectory.sample(t, q.as_mut_slice(), &mut v, &mut a);
-        let at = |source| LoopError::AlongMotion { t, source: Box::new(source) };
-        check_pose(model, &mut data, &q).map_err(at)?;
+        let at = |k: usize, what: &str| Error::Loop {
+            name: model.loops()[k].name.clone(),
+            what: format!("at t = {t:.3} s {what}"),
+        };
+        forward_kinematics(model, &mut data, &q);
+        if let Some(k) = data.open_loop() {
+            return Err(at(k, OPEN));
+        }
         for (k, angle) in data.transmission_angles().iter().copied().enumerate() {
             // An angle whose extrapolation is below zero but which rises again has passed zero.
             let [last_but_one, last] = before[k];
             if 2.0 * last - last_but_one <= 0.0 && angle > 0.0 && last < 0.2 {
-                return Err(at(LoopError::DeadPoint { name: model.loops()[k].name.clone() }));
+                return Err(at(k, DEAD_POINT));
             }
             before[k] = [last, angle];
-            if angle < seen.smallest[k].0 {
-                seen.smallest[k] = (angle, t);
+            if angle < found.smallest[k].0 {
+                found.smallest[k] = (angle, t);
             }
         }
-        for ([low, high], value) in seen.range.iter_mut().zip(data.dependent_values()) {
+        for ([low, high], value) in found.range.iter_mut().zip(data.dependent_values()) {
             (*low, *high) = (low.min(*value), high.max(*value));
         }
     }
-    Ok(seen)
+    Ok(found)
 }

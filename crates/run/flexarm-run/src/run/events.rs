@@ -62,7 +62,7 @@ pub(super) fn beyond_model(error: Error, caveats: &[Finding]) -> Error {
         |caveat: &&Finding| [kinds::LARGE_DEFORMATION.code, kinds::LARGE_STRAIN.code].contains(&&*caveat.code);
     match (error, caveats.iter().find(of_shape)) {
         (Error::Step { source: StepError::NotConverged { t, .. }, partial }, Some(caveat)) => {
-            Error::Step { source: StepError::BeyondModel { t, doubt: caveat.message.clone() }, partial }
+            Error::Step { source: StepError::BeyondModel { t, finding: caveat.message.clone() }, partial }
         }
         (error, _) => error,
     }

@@ -59,8 +59,8 @@ impl RunLoop<'_> {
     }
 
     fn link_figures(&self) -> Vec<LinkFigures> {
-        let seen = self.monitors.contributions.result().iter().zip(self.monitors.strains.result());
-        let figures = self.arm.spans.iter().zip(seen).map(|(span, (moved, strained))| LinkFigures {
+        let measured = self.monitors.contributions.result().iter().zip(self.monitors.strains.result());
+        let figures = self.arm.spans.iter().zip(measured).map(|(span, (moved, strained))| LinkFigures {
             name: span.link.clone(),
             peak_contribution_m: moved.peak_m,
             engineering_strain: strained.strain,
@@ -71,8 +71,8 @@ impl RunLoop<'_> {
 
     fn drive_figures(&self) -> Vec<DriveFigures> {
         let moved = &self.monitors.contributions.result()[self.arm.spans.len()..];
-        let seen = moved.iter().zip(self.monitors.deflections.result());
-        let drives = self.robot.drives.iter().zip(seen).enumerate();
+        let measured = moved.iter().zip(self.monitors.deflections.result());
+        let drives = self.robot.drives.iter().zip(measured).enumerate();
         let elastic = drives.filter(|(k, _)| self.arm.owners.contains(&Owner::Drive(*k)));
         let figures = elastic.map(|(_, (drive, (moved, deflection)))| DriveFigures {
             joint: drive.joint.clone(),
@@ -153,7 +153,7 @@ impl RunLoop<'_> {
         let is_linear =
             |k: usize| elements().any(|(e, owner)| *owner == Owner::Link(k) && e.modal && e.geometric.is_none());
         let soft = links.filter(|(k, _)| is_linear(*k));
-        soft.filter_map(|(_, (span, seen))| validity::spin(&span.link, seen.speed, first_hz)).collect()
+        soft.filter_map(|(_, (span, measured))| validity::spin(&span.link, measured.speed, first_hz)).collect()
     }
 
     /// Caveats about gearbox deflections.

@@ -26,7 +26,7 @@ pub(crate) struct Recordings {
     /// Folders created for them.
     folders: Undo,
     /// Lock that reserves the folder for this run.
-    held: Option<FolderLock>,
+    lock: Option<FolderLock>,
 }
 
 impl Recordings {
@@ -146,7 +146,7 @@ pub(crate) fn recorder(
 /// whether the recording of the study is being written too.
 pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Recordings, Error> {
     let mut recordings =
-        Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default(), held: None };
+        Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default(), lock: None };
     let Some(outputs) = outputs else { return Ok(recordings) };
     let mut ours = vec!["report.html", "report.md", "summary.json"];
     ours.extend(outputs.recordings.iter().map(|format| format.info().file_name));
@@ -177,10 +177,10 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     // Old files are removed only after all new files have been found writable.
     recordings.set.check()?;
     recordings.folders.make(&outputs.folder).map_err(|e| unusable(format!("the output folder cannot be made: {e}")))?;
-    let held = FolderLock::take(&outputs.folder).ok_or_else(|| {
+    let lock = FolderLock::take(&outputs.folder).ok_or_else(|| {
         unusable("another run is writing into this folder: wait for its end, or choose another folder".into())
     })?;
-    recordings.held = Some(held);
+    recordings.lock = Some(lock);
     if outputs.overwrite {
         remove_leftovers(outputs, &ours)?;
     }

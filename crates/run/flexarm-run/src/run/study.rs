@@ -82,7 +82,7 @@ pub fn compare_study(
         let request = RunRequest {
             outputs: own.as_ref(),
             progress: Some(&mut |t: f64, _: f64| progress(before + t, total)),
-            recorders: recording.seat(number).into_iter().collect(),
+            recorders: recording.recorder(number).into_iter().collect(),
             expected: Some(expected),
             ..RunRequest::keeping(Keep::Curves)
         };
@@ -188,8 +188,8 @@ impl StudyRecording {
         Self { study: study.map(|study| (path, study)) }
     }
 
-    fn seat(&self, number: usize) -> Option<Box<dyn Recorder>> {
-        self.study.as_ref().map(|(_, study)| study.seat(number))
+    fn recorder(&self, number: usize) -> Option<Box<dyn Recorder>> {
+        self.study.as_ref().map(|(_, study)| study.recorder(number))
     }
 
     fn finish(self, summary: &Summary) -> Result<Option<PathBuf>, Error> {

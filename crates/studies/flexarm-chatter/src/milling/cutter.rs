@@ -96,7 +96,7 @@ impl Cutter {
     /// Checks the parameters.
     ///
     /// # Errors
-    /// [`ChatterError::Value`] for invalid parameters.
+    /// [`ChatterError::Invalid`] for invalid parameters.
     pub fn check(&self) -> Result<(), ChatterError> {
         let Engagement { entry, exit } = self.engagement;
         let Coefficients { tangential, radial, axial } = self.coefficients;
@@ -123,7 +123,7 @@ impl Cutter {
             ),
         ];
         match rules.into_iter().find(|rule| !rule.2) {
-            Some((what, found, _, expected)) => Err(ChatterError::Value { what, found, expected }),
+            Some((what, found, _, expected)) => Err(ChatterError::value(what, found, expected)),
             None => Ok(()),
         }
     }

@@ -83,7 +83,7 @@ pub struct Limit {
 /// multiplier has a visible peak there.
 ///
 /// # Errors
-/// [`ChatterError::Value`] for an invalid cutter, speed or option, [`ChatterError::TooSlow`] if a
+/// [`ChatterError::Invalid`] for an invalid cutter, speed or option, or if a
 /// tooth period contains too many oscillations.
 pub fn limit_of_depth(
     structure: &Structure,
@@ -187,7 +187,7 @@ fn check(cutter: &Cutter, spindle: f64, options: &LimitOptions) -> Result<(), Ch
         ("the tolerance", options.tolerance, positive(options.tolerance), "above 0"),
     ];
     match rules.into_iter().find(|rule| !rule.2) {
-        Some((what, found, _, expected)) => Err(ChatterError::Value { what, found, expected }),
+        Some((what, found, _, expected)) => Err(ChatterError::value(what, found, expected)),
         None => Ok(()),
     }
 }
@@ -195,7 +195,11 @@ fn check(cutter: &Cutter, spindle: f64, options: &LimitOptions) -> Result<(), Ch
 fn check_size(period: &Period, depth: f64, spindle: f64) -> Result<(), ChatterError> {
     let unknowns = period.unknowns(depth);
     if unknowns > MAX_UNKNOWNS {
-        return Err(ChatterError::TooSlow { rpm: spindle * 60.0 / TAU, unknowns, most: MAX_UNKNOWNS });
+        return Err(ChatterError::Invalid(format!(
+            "at {:.0} rpm a tooth period contains too many oscillations: {unknowns} unknowns, the maximum is \
+             {MAX_UNKNOWNS}; use a higher spindle speed, or remove modes with no influence",
+            spindle * 60.0 / TAU
+        )));
     }
     Ok(())
 }

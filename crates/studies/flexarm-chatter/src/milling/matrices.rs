@@ -26,9 +26,9 @@ impl Structure {
     /// * `J`: 3×n, velocity of the tip per rate of the coordinates, in the axes of the cut.
     ///
     /// # Errors
-    /// [`ChatterError::Size`], [`ChatterError::NotFinite`], [`ChatterError::NotPositiveDefinite`],
-    /// [`ChatterError::Undamped`] for a mode that does not decay, [`ChatterError::NotConverged`];
-    /// [`ChatterError::NotModal`] for two coinciding modes.
+    /// [`ChatterError::Invalid`] for matrices that do not fit or are not positive definite,
+    /// [`ChatterError::Undamped`] for a mode that does not decay,
+    /// [`ChatterError::Unsolved`] for two coinciding modes or an iteration that does not converge.
     pub fn from_matrices(
         M: &DMatrix<f64>,
         D: &DMatrix<f64>,
@@ -56,8 +56,7 @@ impl Structure {
             (false, false) => -D_eta[(i - n, j - n)],
         });
         let (values, right) = eigenvectors(&A)?;
-        let left =
-            right.clone().try_inverse().ok_or(ChatterError::NotModal { found: f64::INFINITY, allowed: ALLOWED })?;
+        let left = right.clone().try_inverse().ok_or_else(|| not_modal(f64::INFINITY))?;
 
         // One pole per conjugate pair: output from the right, input from the left eigenvector.
         let scale = values.iter().map(|x| x.norm()).fold(0.0, f64::max);
@@ -94,7 +93,7 @@ impl Structure {
             let Some(G) = truth(w) else { continue };
             let found = (self.frequency_response(w) - G).norm() / G.norm().max(f64::MIN_POSITIVE);
             if found > ALLOWED && G.norm() > 0.0 {
-                return Err(ChatterError::NotModal { found, allowed: ALLOWED });
+                return Err(not_modal(found));
             }
         }
         Ok(())
@@ -105,17 +104,17 @@ fn check(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>, J: &Matrix3xX<f64
     let n = M.nrows();
     for (what, matrix) in [("mass matrix", M), ("damping matrix", D), ("stiffness matrix", K)] {
         if matrix.shape() != (n, n) {
-            return Err(ChatterError::Size { what, found: matrix.shape(), expected: (n, n) });
+            return Err(ChatterError::size(what, matrix.shape(), (n, n)));
         }
         if matrix.iter().any(|x| !x.is_finite()) {
-            return Err(ChatterError::NotFinite { what });
+            return Err(ChatterError::not_finite(what));
         }
     }
     if J.ncols() != n {
-        return Err(ChatterError::Size { what: "Jacobian of the tip", found: J.shape(), expected: (3, n) });
+        return Err(ChatterError::size("Jacobian of the tip", J.shape(), (3, n)));
     }
     if J.iter().any(|x| !x.is_finite()) {
-        return Err(ChatterError::NotFinite { what: "Jacobian of the tip" });
+        return Err(ChatterError::not_finite("Jacobian of the tip"));
     }
     Ok(())
 }
@@ -123,17 +122,17 @@ fn check(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>, J: &Matrix3xX<f64
 /// Frequencies (rad/s) and mass-normalised mode shapes, with the symmetric part of the stiffness.
 fn undamped(M: &DMatrix<f64>, K: &DMatrix<f64>) -> Result<(Vec<f64>, DMatrix<f64>), ChatterError> {
     let mass = Cholesky::new((M + M.transpose()) * 0.5);
-    let mass = mass.ok_or(ChatterError::NotPositiveDefinite { what: "mass matrix" })?;
+    let mass = mass.ok_or_else(|| ChatterError::not_positive_definite("mass matrix"))?;
     let stiffness = Cholesky::new((K + K.transpose()) * 0.5);
-    let stiffness = stiffness.ok_or(ChatterError::NotPositiveDefinite { what: "stiffness matrix" })?;
+    let stiffness = stiffness.ok_or_else(|| ChatterError::not_positive_definite("stiffness matrix"))?;
     // Eigenvalues 1/ω² of L^-1 M L^-T with K = L Lᵀ: the low modes, which move the tip most, have
     // the largest ones.
-    let singular = || ChatterError::NotPositiveDefinite { what: "stiffness matrix" };
+    let singular = || ChatterError::not_positive_definite("stiffness matrix");
     let (L, half) = (stiffness.l(), mass.l());
     let X = L.solve_lower_triangular(&half).ok_or_else(singular)?;
     let eigen = SymmetricEigen::new(&X * X.transpose());
     if eigen.eigenvalues.min() <= 0.0 {
-        return Err(ChatterError::NotPositiveDefinite { what: "mass matrix" });
+        return Err(ChatterError::not_positive_definite("mass matrix"));
     }
     let mut Phi = eigen.eigenvectors;
     L.tr_solve_lower_triangular_mut(&mut Phi);
@@ -152,7 +151,7 @@ fn eigenvectors(A: &DMatrix<f64>) -> Result<Eigenvectors, ChatterError> {
     let n = A.nrows();
     let complex = A.map(|x| Complex::new(x, 0.0));
     let schur = Schur::try_new(complex, f64::EPSILON, 400 * n);
-    let (Q, T) = schur.ok_or(ChatterError::NotConverged { what: "the structure" })?.unpack();
+    let (Q, T) = schur.ok_or_else(not_converged)?.unpack();
     let least = f64::EPSILON * A.norm();
     let mut Y = DMatrix::<Complex<f64>>::zeros(n, n);
     for k in 0..n {
@@ -197,4 +196,15 @@ fn response(
     let X = dynamic.lu().solve(&J.transpose().map(complex))?;
     let G = J.map(complex) * X;
     Some(Matrix3::from_fn(|i, j| G[(i, j)]))
+}
+
+fn not_modal(found: f64) -> ChatterError {
+    ChatterError::Unsolved(format!(
+        "the modes reproduce the frequency response of the structure with a relative error of {found:.1e}, expected \
+         at most {ALLOWED:.0e}: are two modes equal?"
+    ))
+}
+
+fn not_converged() -> ChatterError {
+    ChatterError::Unsolved("the eigenvalue iteration for the structure does not converge".into())
 }

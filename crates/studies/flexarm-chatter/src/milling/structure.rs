@@ -48,13 +48,13 @@ impl Structure {
     /// Returns a structure with given poles.
     ///
     /// # Errors
-    /// [`ChatterError::NotFinite`]; [`ChatterError::Undamped`] for a pole that does not decay,
+    /// [`ChatterError::Invalid`]; [`ChatterError::Undamped`] for a pole that does not decay,
     /// whose limit of depth is zero.
     pub fn from_poles(poles: Vec<Pole>) -> Result<Self, ChatterError> {
         for pole in &poles {
             let numbers = pole.input.iter().chain(pole.output.iter()).chain([&pole.value]);
             if numbers.into_iter().any(|x| !(x.re.is_finite() && x.im.is_finite())) {
-                return Err(ChatterError::NotFinite { what: "a pole" });
+                return Err(ChatterError::not_finite("a pole"));
             }
             if pole.value.re >= 0.0 {
                 let damping_ratio = -pole.value.re / pole.value.norm().max(f64::MIN_POSITIVE);

@@ -21,7 +21,7 @@ use crate::file::{Role, StudyFile, Values};
 use crate::options::StudyOptions;
 use crate::path::{Segment, places};
 use crate::recent::Recent;
-use crate::target::{Edit, Target, TargetError, TargetFile, edits};
+use crate::target::{Edit, Target, TargetFile, edits};
 use crate::value::ParameterValue;
 use crate::{Finders, fingerprint};
 
@@ -75,7 +75,7 @@ impl Workshop {
     pub(crate) fn new(file: &StudyFile, finders: &Finders) -> Result<Self, Error> {
         let mut options = StudyOptions::default();
         for (key, value, place) in &file.options {
-            options.set(key, value).map_err(|error| RobotFileError { message: error.to_string(), ..place.clone() })?;
+            options.set(key, value).map_err(|message| RobotFileError { message, ..place.clone() })?;
         }
         let mut shop = Self {
             files: FileCache::default(),
@@ -222,8 +222,7 @@ impl Workshop {
     pub(crate) fn vary(&mut self, columns: &[Column], file: &StudyFile, finders: &Finders) -> Result<(), Error> {
         let jobs: Vec<String> = self.jobs.iter().map(|(link, _)| link.clone()).collect();
         for column in columns {
-            let fail =
-                |error: TargetError| RobotFileError { message: format!("parameter {error}"), ..column.place.clone() };
+            let fail = |error: String| RobotFileError { message: format!("parameter {error}"), ..column.place.clone() };
             let targets = column.paths.iter().map(|path| Ok((Target::parse(path, &jobs).map_err(fail)?, path.clone())));
             let targets = targets.collect::<Result<Vec<_>, RobotFileError>>()?;
             for (target, text) in &targets {
@@ -266,8 +265,7 @@ impl Workshop {
                     self.options.clone().set(key, value).map_err(|error| fail(format!("{text:?}: {error}")))?;
                 }
                 Target::Entry(which, path) => {
-                    let fail = |error: TargetError| fail(error.to_string());
-                    let no_file = || fail(TargetError::NoFile { path: text.to_owned() });
+                    let no_file = || fail(no_file(text));
                     let path_of_file = self.base_path(*which).ok_or_else(no_file)?;
                     self.entry_edits(&path_of_file, path, text, column.role, value, &[]).map_err(fail)?;
                 }
@@ -292,7 +290,7 @@ impl Workshop {
 
     /// Returns the names of all entries that a path matches in the robot file or another file of
     /// the study, for one parameter each.
-    pub(crate) fn expanded(&self, text: &str) -> Result<Vec<String>, TargetError> {
+    pub(crate) fn expanded(&self, text: &str) -> Result<Vec<String>, String> {
         let jobs: Vec<String> = self.jobs.iter().map(|(link, _)| link.clone()).collect();
         let Target::Entry(which, path) = Target::parse(text, &jobs)? else { return Ok(vec![text.to_owned()]) };
         let before = match which {
@@ -301,7 +299,7 @@ impl Workshop {
             TargetFile::Loads => "loads.".into(),
             TargetFile::Job(number) => format!("reduce.{}.", self.jobs[number].0),
         };
-        let file = self.base_path(which).ok_or_else(|| TargetError::NoFile { path: text.to_owned() })?;
+        let file = self.base_path(which).ok_or_else(|| no_file(text))?;
         let Some((root, _)) = &self.texts[&file].parsed else { return Ok(vec![text.to_owned()]) };
         let named =
             |name: String| name.strip_prefix("flexible_link.").map_or(name.clone(), |rest| format!("link.{rest}"));
@@ -318,10 +316,14 @@ impl Workshop {
         role: Role,
         value: &ParameterValue,
         known: &[Edit],
-    ) -> Result<Vec<Edit>, TargetError> {
+    ) -> Result<Vec<Edit>, String> {
         match self.texts.get(file).and_then(|file| file.parsed.as_ref()) {
             Some((root, _)) => edits(root, path, text, role, value, known),
-            None => Err(TargetError::NoToml { path: text.to_owned(), file: file.to_owned() }),
+            None => Err(format!("{text:?}: {} is not a TOML file and has no keys", file.display())),
         }
     }
+}
+
+fn no_file(path: &str) -> String {
+    format!("{path:?}: the study names no file of this kind")
 }

@@ -63,7 +63,7 @@ impl Pins {
         self.rows.is_empty()
     }
 
-    /// Updates the rows at the current poses. Returns the first loop that is open or at a dead
+    /// Updates the rows at the current poses `X_WB` of the bodies. Returns the first loop that is open or at a dead
     /// point.
     pub(super) fn update(&mut self, model: &Model, poses: &[Pose], bodies: &[BodyState]) -> Option<usize> {
         let mut open = None;

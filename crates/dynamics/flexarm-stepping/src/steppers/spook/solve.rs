@@ -7,6 +7,9 @@
 //! Q λ = ŝ - G_p v_p,   Q = Σ + G_c M̂_c^-1 G_cᵀ,   ŝ = s - G_c M̂_c^-1 b̂_c        (2)
 //! M̂_p += G_pᵀ Q^-1 G_p,   b̂_p += G_pᵀ Q^-1 ŝ                                    (3)
 //! ```
+//! Each `v` is the twist of a body at its centre of mass, `b` a momentum about it, both in world
+//! axes, linear part first; `λ`, `s` and `Σ` are in the six rows of a joint.
+//!
 //! For a serial arm this is the block tridiagonal LDLᵀ in body order. M̂ and Q are symmetric
 //! positive definite. `G_c` is square and block triangular with a known inverse, so that neither M̂
 //! nor Q is factorised; in the coordinates of the rows
@@ -57,6 +60,7 @@ fn halves(v: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
     (Vector3::new(v[0], v[1], v[2]), Vector3::new(v[3], v[4], v[5]))
 }
 
+/// Six-vector of a linear and an angular part in the same axes.
 #[inline]
 pub(super) fn joined(a: &Vector3<f64>, b: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(a.x, a.y, a.z, b.x, b.y, b.z)
@@ -87,7 +91,7 @@ impl Symmetric {
         Self { A: Matrix3::zeros(), B: Matrix3::zeros(), C: Matrix3::zeros() }
     }
 
-    /// Creates the blocks of a symmetric matrix.
+    /// Creates the blocks of a symmetric matrix, linear rows first, in its axes.
     pub fn new(X: &Matrix6<f64>) -> Self {
         let block = |i, j| X.fixed_view::<3, 3>(i, j).into_owned();
         Self { A: block(0, 0), B: block(0, 3), C: block(3, 3) }
@@ -97,7 +101,7 @@ impl Symmetric {
         Self { A: self.A * s, B: self.B * s, C: self.C * s }
     }
 
-    /// Returns `blkdiag(R, R) X blkdiag(R, R)ᵀ`.
+    /// Returns `blkdiag(R, R) X blkdiag(R, R)ᵀ`: the matrix in the axes into which R turns.
     pub(super) fn turned(&self, R: &Matrix3<f64>) -> Self {
         let B = mul3(&mul3(R, &self.B), &R.transpose());
         Self { A: turn_symmetric(R, &self.A), B, C: turn_symmetric(R, &self.C) }
@@ -202,7 +206,7 @@ pub enum Jacobian {
 }
 
 impl Jacobian {
-    /// Returns `G_p v`.
+    /// Returns `G_p v` for the twist of the parent in world axes.
     #[inline]
     pub fn of_parent(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {
@@ -214,7 +218,7 @@ impl Jacobian {
         }
     }
 
-    /// Returns `G_c v`.
+    /// Returns `G_c v` for the twist of the child in world axes.
     #[inline]
     pub fn of_child(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {

@@ -81,12 +81,12 @@ impl Sets {
 
     /// Finds a set by name, ignoring case, with or without the instance before a point.
     pub(super) fn find(&self, src: &Source, name: &str, scope: Scope, at: usize) -> Result<usize, FeFileError> {
-        let look = |name: &str| {
+        let lookup = |name: &str| {
             let key = squeezed(unquoted(name));
             let inside = self.by_name.get(&(scope, key.clone()));
             inside.or_else(|| self.by_name.get(&(Scope::Part, key))).copied()
         };
-        let known = look(name).or_else(|| look(name.rsplit_once('.')?.1));
+        let known = lookup(name).or_else(|| lookup(name.rsplit_once('.')?.1));
         known.ok_or_else(|| {
             let known = listed(self.list.iter().map(|set| &set.name));
             let element = format!("{} set {name:?}", self.what);
@@ -173,17 +173,17 @@ impl Sets {
         // Members of nested sets: one traversal per set with an explicit stack, so that cycles and
         // deep nesting are harmless.
         let mut all = direct.clone();
-        let mut seen_from = vec![usize::MAX; self.list.len()];
+        let mut reached_from = vec![usize::MAX; self.list.len()];
         for (k, set) in self.list.iter().enumerate().filter(|(_, set)| !set.inner.is_empty()) {
             let mut open = vec![k];
-            seen_from[k] = k;
+            reached_from[k] = k;
             while let Some(inside) = open.pop() {
                 budget.spend(src, set.at, &set.name, direct[inside].len() + 1)?;
                 if inside != k {
                     all[k].extend_from_slice(&direct[inside]);
                 }
                 for next in &self.list[inside].inner {
-                    if std::mem::replace(&mut seen_from[*next], k) != k {
+                    if std::mem::replace(&mut reached_from[*next], k) != k {
                         open.push(*next);
                     }
                 }

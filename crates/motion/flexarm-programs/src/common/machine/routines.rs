@@ -21,8 +21,8 @@ impl<D: Dialect> Machine<'_, D> {
             if let Err(fail) = self.run(std::slice::from_ref(statement))
                 && let Action::Declare { name, .. } = &statement.action
             {
-                let line = self.recorder.line(statement.span);
-                let what = format!("`{name}`, whose declaration in line {line} cannot be read ({})", fail.message);
+                let place = self.recorder.place(statement.span);
+                let what = format!("`{name}`, whose declaration at {place} cannot be read ({})", fail.message);
                 self.set_global(name, Value::Outside(what.into()));
             }
         }

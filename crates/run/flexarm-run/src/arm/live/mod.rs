@@ -215,7 +215,7 @@ impl Arm {
         let (has_payload, options) = (own.payload, options.clone());
         let stepper = started(&arm, plants.carrying(has_payload)?, &options, servos, &targets)?;
         let mut live = Live { arm, plants, has_payload, servos, options, period_s, targets, push, stepper, readings };
-        live.look();
+        live.observe();
         Ok(live)
     }
 }
@@ -373,7 +373,7 @@ impl Live {
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = Wrench::zeros();
         let plant = self.plants.carrying(self.has_payload)?;
         self.stepper = started(&self.arm, plant, &self.options, self.servos, &self.targets)?;
-        self.look();
+        self.observe();
         Ok(())
     }
 
@@ -414,7 +414,7 @@ impl Live {
         for _ in 0..steps {
             self.stepper.step().map_err(|source| Error::Step { source, partial: false })?;
         }
-        self.look();
+        self.observe();
         Ok(())
     }
 
@@ -428,7 +428,7 @@ impl Live {
         if carried != self.has_payload {
             self.stepper.change_masses(plant).map_err(|source| Error::Step { source, partial: false })?;
             self.has_payload = carried;
-            self.look();
+            self.observe();
         }
         Ok(())
     }
@@ -485,7 +485,7 @@ impl Live {
         }
     }
 
-    fn look(&mut self) {
+    fn observe(&mut self) {
         self.stepper.observe(&mut self.readings.seen);
         let period = self.targets.0.read().unwrap_or_else(PoisonError::into_inner);
         self.readings.set_targets(&period.q[1]);

@@ -9,6 +9,7 @@ use flexarm_kinematics::{Data, NullSpaceRule, Pose, forward_kinematics};
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
 use flexarm_path::{ControllerAxis, PathOptions, ProgramArm, check_axes, check_rate};
 use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
+use flexarm_settings::Place;
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use toml::Spanned;
@@ -235,11 +236,10 @@ impl Reader<'_> {
         // Orientation of the tool in the base at the end of the last move.
         let mut R: Option<Rotation3<f64>> = None;
         for table in moves {
-            let (line, _) = self.place(table);
             let entry = table.get_ref();
             self.only_one(table)?;
             if let Some(seconds) = &entry.dwell {
-                items.push(Item::Dwell { line, seconds: *seconds.get_ref() });
+                items.push(Item::Dwell { place: self.place(table), seconds: *seconds.get_ref() });
             } else if let Some(points) = &entry.spline {
                 self.spline(table, points, &mut R, &mut items)?;
             } else {
@@ -249,9 +249,8 @@ impl Reader<'_> {
         Ok(items)
     }
 
-    fn place<T>(&self, at: &Spanned<T>) -> (usize, usize) {
-        let error = self.source.error(at.span(), "");
-        (error.line, error.column)
+    fn place<T>(&self, at: &Spanned<T>) -> Place {
+        self.source.error(at.span(), "").place()
     }
 
     /// Returns the orientation of the tool that a table gives, if it gives one.
@@ -445,7 +444,7 @@ impl Reader<'_> {
 
     fn standard(&self, table: &Spanned<StandardTable>) -> Result<Vec<Item>, RobotFileError> {
         let entry = table.get_ref();
-        let (line, _) = self.place(table);
+        let place = self.place(table);
         let R = self.orientation(table, entry.rpy, entry.quaternion)?;
         let R = R.ok_or_else(|| self.source.error(table.span(), "give the tool's orientation: rpy or quaternion"))?;
         let side = *entry.side.get_ref() * self.units.length;
@@ -461,7 +460,7 @@ impl Reader<'_> {
         let count = steps.len();
         let item = |(k, step): (usize, Step)| {
             let (kind, X_BT) = match step {
-                Step::Rest(seconds) => return Item::Dwell { line, seconds },
+                Step::Rest(seconds) => return Item::Dwell { place: place.clone(), seconds },
                 Step::To(kind, X_BT) => (kind, X_BT),
             };
             let configuration = match (&entry.near, &kind) {
@@ -475,7 +474,8 @@ impl Reader<'_> {
             let blend = if passes { Blend::Pass } else { self.blend(None) };
             let statement = format!("step {k} of the standard motion");
             let (speed, to) = (self.speed(None), Target::Pose { X_BT, configuration });
-            Item::Move(Move { line, statement, kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend })
+            let place = place.clone();
+            Item::Move(Move { place, statement, kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend })
         };
         Ok(steps.into_iter().enumerate().map(item).collect())
     }
@@ -506,9 +506,9 @@ impl Reader<'_> {
 
     fn of(&self, table: &Spanned<MoveTable>, statement: &str, kind: MoveKind, to: Target) -> Move {
         let entry = table.get_ref();
-        let (line, _) = self.place(table);
+        let place = self.place(table);
         let (speed, blend) = (self.speed(Some(entry)), self.blend(entry.blend));
-        Move { line, statement: statement.to_owned(), kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend }
+        Move { place, statement: statement.to_owned(), kind, to, X_WB: self.X_WB, X_FT: self.X_FT, speed, blend }
     }
 
     /// Returns the speed of a move, with defaults from `[path]`.

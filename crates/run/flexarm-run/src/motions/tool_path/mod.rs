@@ -8,11 +8,12 @@ mod program;
 mod standard;
 mod tables;
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
 use flexarm_kinematics::{Frame, Model, Pose};
-use flexarm_path::program::{Note, Program, Speed};
+use flexarm_path::program::{Move, Program, Speed};
 use flexarm_path::{
     ControllerAxis, JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
 };
@@ -37,7 +38,7 @@ const ACCELERATION: f64 = 10.0;
 /// Minimum singular value below which a path counts as near-singular, m/rad.
 const NEAR_SINGULAR: f64 = 0.02;
 /// Maximum number of notes of one kind that are listed individually.
-const TOLD: usize = 4;
+const MAX_NOTES: usize = 4;
 /// ROS name of the link at the controller's flange.
 const FLANGE: &str = "tool0";
 const BASE: &str = "base";
@@ -47,14 +48,10 @@ const BASE: &str = "base";
 pub struct ToolPath {
     /// Planned moves in order.
     pub moves: Vec<PlannedMove>,
-    /// Path of the file.
-    pub(crate) file: String,
     /// Jerk limits kept by the motion, by joint, rad/s³ or m/s³.
     pub(crate) jerks: Vec<(String, f64)>,
-    /// Warnings.
-    pub(crate) warnings: Vec<String>,
-    /// Notes.
-    pub(crate) notes: Vec<String>,
+    /// Warnings, then notes.
+    pub(crate) caveats: Vec<Finding>,
 }
 
 /// Robot data needed for planning.
@@ -190,87 +187,92 @@ impl ToolPath {
         program: &Program,
         arm: &ProgramArm<'_>,
         options: &PathOptions,
-        mut warnings: Vec<String>,
+        warnings: Vec<String>,
     ) -> Result<(Trajectory, Self), Error> {
-        let planned = plan(program, arm, options).map_err(|source| {
-            let notes = program.notes.iter().take(TOLD).map(noted).collect();
-            Error::Path { path: file.to_owned(), source: Box::new(source), notes }
+        let planned = plan(program, arm, options).map_err(|mut finding| {
+            if finding.location.is_empty() {
+                finding.location = file.display().to_string();
+            }
+            let notes =
+                program.notes.iter().take(MAX_NOTES).map(|note| placed(&note.location, &note.message)).collect();
+            Error::Path { finding, notes }
         })?;
-        let stops = planned.stops.iter().map(|(line, why)| format!("line {line}: no blend: {why}")).collect();
-        warnings.extend(first_of(stops));
-        let held = planned.held.join(", ");
-        if !held.is_empty() {
+        let file = file.display().to_string();
+        let mut warnings: Vec<Finding> = warnings.iter().map(|text| warning(&file, text)).collect();
+        let stops = planned.stops.iter().map(|(place, why)| warning(place, format!("no blend: {why}"))).collect();
+        warnings.extend(first_of(stops, &file));
+        let fixed = planned.fixed.join(", ");
+        if !fixed.is_empty() {
             let what = match options.rule {
                 None => "stay while the tool follows its path (redundancy of a path file chooses otherwise)",
                 Some(_) => "move redundantly, towards the requested posture",
             };
-            warnings.push(format!("the arm has more joints than the path needs: {held} {what}"));
+            let text = format!("the arm has more joints than the path needs: {fixed} {what}");
+            warnings.push(warning(&file, text));
         }
         warnings.extend(tool_warning(program, arm));
         warnings.extend(speed_warnings(program));
         let slowed = planned.moves.iter().filter_map(|of| of.slowed.as_ref().map(|slowed| slowed_warning(of, slowed)));
-        warnings.extend(first_of(slowed.collect()));
+        warnings.extend(first_of(slowed.collect(), &file));
         let near = planned.moves.iter().filter_map(|of| {
             let (sigma, t) = of.least_sigma.filter(|(sigma, _)| *sigma < NEAR_SINGULAR)?;
-            Some(format!(
-                "line {}: {}: passes near a singular pose at {t:.3} s (least singular value {sigma:.1e} m/rad): joints move fast \
+            let text = format!(
+                "{}: passes near a singular pose at {t:.3} s (least singular value {sigma:.1e} m/rad): joints move fast \
                  for little of the tool",
-                of.line, of.statement
-            ))
+                of.statement
+            );
+            Some(warning(&of.place, text))
         });
-        warnings.extend(first_of(near.collect()));
-        let notes = program.notes.iter().map(noted).collect();
+        warnings.extend(first_of(near.collect(), &file));
         let jerk = |(k, bounds): (usize, &JointBounds)| Some((arm.model.coordinates()[k].joint.clone(), bounds.jerk?));
         let jerks = arm.bounds.iter().enumerate().filter_map(jerk).collect();
-        let file = file.display().to_string();
-        Ok((planned.trajectory, Self { moves: planned.moves, file, jerks, warnings, notes }))
+        let notes = program.notes.iter().map(|note| warning(&note.location, &note.message).as_note());
+        warnings.extend(notes);
+        Ok((planned.trajectory, Self { moves: planned.moves, jerks, caveats: warnings }))
     }
 
     /// Returns the jerk limit of a joint, rad/s³ or m/s³, if one is given.
     pub(crate) fn jerk_of(&self, joint: &str) -> Option<f64> {
         self.jerks.iter().find(|(name, _)| name == joint).map(|(_, jerk)| *jerk)
     }
-
-    /// Returns the caveats about the path.
-    pub(crate) fn caveats(&self) -> Vec<Finding> {
-        let caveat = |text: &String| Finding::warning("tool-path", &self.file, format!("{}: {text}", self.file), "");
-        let notes = self.notes.iter().map(|text| caveat(text).as_note());
-        self.warnings.iter().map(caveat).chain(notes).collect()
-    }
 }
 
-fn noted(note: &Note) -> String {
-    let place = note.line.map_or_else(String::new, |line| format!("line {line}: "));
-    format!("{place}{}", note.text)
+/// Text of a caveat with its place.
+fn placed(place: impl Display, text: impl Display) -> String {
+    format!("{place}: {text}")
+}
+
+fn warning(place: impl Display, text: impl Display) -> Finding {
+    Finding::warning("tool-path", place.to_string(), placed(&place, text), "")
 }
 
 /// Returns the first few of a list, and the number of those left out.
-fn first_of(mut notes: Vec<String>) -> Vec<String> {
-    let more = notes.len().saturating_sub(TOLD);
+fn first_of(mut notes: Vec<Finding>, file: &str) -> Vec<Finding> {
+    let more = notes.len().saturating_sub(MAX_NOTES);
     if more > 0 {
-        notes.truncate(TOLD);
-        notes.push(format!("and {more} more like the last"));
+        notes.truncate(MAX_NOTES);
+        notes.push(warning(file, format!("and {more} more like the last")));
     }
     notes
 }
 
 /// Warns if the program's tool differs from the robot's, at which the error is measured.
-fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<String> {
+fn tool_warning(program: &Program, arm: &ProgramArm<'_>) -> Option<Finding> {
     use flexarm_path::program::Item;
     let other = program.items.iter().find_map(|item| match item {
         Item::Move(of) => {
             let X_FT = of.X_FT?;
             let apart = (X_FT.translation.vector - arm.X_FT.translation.vector).norm();
-            (apart > 1e-6).then_some((of.line, apart))
+            (apart > 1e-6).then_some((&of.place, apart))
         }
         Item::Dwell { .. } => None,
     })?;
-    Some(format!(
-        "line {}: the program's tool ends {:.1} mm from the robot's tool centre point: the program's follows the path, the error \
+    let text = format!(
+        "the program's tool ends {:.1} mm from the robot's tool centre point: the program's follows the path, the error \
          is measured at the robot's (tcp of the robot file)",
-        other.0,
         other.1 * 1e3
-    ))
+    );
+    Some(warning(other.0, text))
 }
 
 /// Usual range of a speed of a move.
@@ -334,7 +336,7 @@ const USUAL_SPEEDS: [UsualSpeed; 6] = [
 const BLEND: RangeInclusive<f64> = 2e-5..=2.0;
 
 /// Warns about the first speed of each kind, and the first blend, that no robot has.
-fn speed_warnings(program: &Program) -> Vec<String> {
+fn speed_warnings(program: &Program) -> Vec<Finding> {
     use flexarm_path::program::{Blend, Item};
     let moves = || {
         program.items.iter().filter_map(|item| match item {
@@ -342,27 +344,27 @@ fn speed_warnings(program: &Program) -> Vec<String> {
             Item::Dwell { .. } => None,
         })
     };
-    let text = |line: usize, statement: &str, caveat: Finding| {
+    let text = |of: &Move, caveat: Finding| {
         let likely = if caveat.likely.is_empty() { String::new() } else { format!(" ({})", caveat.likely) };
-        format!("line {line}: {statement}: {}{likely}: check its unit", caveat.message)
+        warning(&of.place, format!("{}: {}{likely}: check its unit", of.statement, caveat.message))
     };
     let speeds = USUAL_SPEEDS.iter().filter_map(|usual| {
         moves().find_map(|of| {
             let found = (usual.of)(&of.speed).filter(|found| found.is_finite())?;
             let kind = UNUSUAL.with_unit(usual.unit);
             let caveat = outside(&kind, usual.what, found, &usual.range, usual.factors, 1.0)?;
-            Some(text(of.line, &of.statement, caveat))
+            Some(text(of, caveat))
         })
     });
     let blend = moves().find_map(|of| {
         let Blend::Distance(found) = of.blend else { return None };
         let caveat = outside(&UNUSUAL.with_unit("m"), "its blend", found, &BLEND, slip::LENGTH, 1.0)?;
-        Some(text(of.line, &of.statement, caveat))
+        Some(text(of, caveat))
     });
     speeds.chain(blend).collect()
 }
 
-fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
+fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> Finding {
     let by = match &slowed.by {
         SlowedBy::JointSpeed(joint) => format!("the speed of joint {joint:?}"),
         SlowedBy::JointAcceleration(joint) => format!("the acceleration of joint {joint:?}"),
@@ -371,6 +373,6 @@ fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> String {
         SlowedBy::Turning => "the turning of the tool".to_owned(),
         SlowedBy::PathAcceleration => "the acceleration across the path".to_owned(),
     };
-    let (line, statement, t, part) = (of.line, &of.statement, slowed.time_s, 100.0 * slowed.part);
-    format!("line {line}: {statement}: slowed to {part:.0} % of its speed at {t:.3} s by {by}")
+    let (statement, t, part) = (&of.statement, slowed.time_s, 100.0 * slowed.part);
+    warning(&of.place, format!("{statement}: slowed to {part:.0} % of its speed at {t:.3} s by {by}"))
 }

@@ -169,7 +169,7 @@ impl ToolPathMonitor {
         let squares: f64 = self.sums.iter().map(|sums| sums.squares).sum();
         let rms = |squares: f64, samples: usize| (squares / samples.max(1) as f64).sqrt();
         let figures = |(of, sums): (&flexarm_path::PlannedMove, &Sums)| PathMoveFigures {
-            line: of.line,
+            line: of.place.line.unwrap_or(0),
             statement: of.statement.clone(),
             span_s: of.span_s,
             across_peak_m: sums.peak,

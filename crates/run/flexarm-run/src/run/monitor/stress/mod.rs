@@ -144,24 +144,24 @@ impl StressMonitor {
     }
 
     /// Adds a sample; one without accelerations is left out.
-    pub(crate) fn update(&mut self, seen: &Observation) {
-        if seen.qddot.iter().any(|a| a.is_nan()) {
+    pub(crate) fn update(&mut self, observed: &Observation) {
+        if observed.qddot.iter().any(|a| a.is_nan()) {
             return;
         }
-        self.times.push(seen.t);
-        self.state.q.copy_from(&seen.q);
-        self.state.qdot.copy_from(&seen.qdot);
-        inverse_dynamics(&seen.model, &mut self.data, &self.state, &seen.qddot);
+        self.times.push(observed.t);
+        self.state.q.copy_from(&observed.q);
+        self.state.qdot.copy_from(&observed.qdot);
+        inverse_dynamics(&observed.model, &mut self.data, &self.state, &observed.qddot);
         let mut q = Vec::new();
         for link in &mut self.links {
             // A holds spatial accelerations minus gravity; ω × v makes them those of the point.
             let V = self.data.V[link.frame.body].at_child(&link.frame.X_BF);
-            link.poses.push(seen.X_WB[link.frame.body] * link.frame.X_BF);
+            link.poses.push(observed.X_WB[link.frame.body] * link.frame.X_BF);
             let A = self.data.A[link.frame.body].at_child(&link.frame.X_BF);
             let a = A.linear + V.angular.cross(&V.linear);
             q.clear();
             for &(first, size) in &link.elements {
-                q.extend_from_slice(&seen.q.as_slice()[first..first + size]);
+                q.extend_from_slice(&observed.q.as_slice()[first..first + size]);
             }
             link.map.append(&q, &inertia_loads(&a, &A.angular, &V.angular), &mut link.amplitudes);
         }
@@ -179,9 +179,9 @@ impl StressMonitor {
     /// Replaces `values` by those of the gauge channels at the last sample: strain (m/m), or signed
     /// von Mises, largest and smallest principal stress (Pa). NaN for a sample without
     /// accelerations.
-    pub(crate) fn read_gauges(&self, seen: &Observation, values: &mut Vec<f64>) {
+    pub(crate) fn read_gauges(&self, observed: &Observation, values: &mut Vec<f64>) {
         values.clear();
-        let is_blind = self.times.last() != Some(&seen.t);
+        let is_blind = self.times.last() != Some(&observed.t);
         for gauge in &self.gauges {
             let stress = if is_blind { [f64::NAN; 6] } else { self.links[gauge.link].last_stress(gauge.site) };
             match gauge.strain {
@@ -284,9 +284,9 @@ impl StressMonitor {
 /// Returns the stress of the links of an arm at rest at coordinates q, without times and damage.
 pub(crate) fn stress_at_rest(arm: &Arm, plant: &Plant, q: &DVector<f64>) -> Result<Vec<LinkStressFigures>, Error> {
     let Some(mut monitor) = StressMonitor::new(arm, plant)? else { return Ok(Vec::new()) };
-    let mut seen = Observation::new(plant);
-    seen.q.copy_from(q);
-    monitor.update(&seen);
+    let mut observed = Observation::new(plant);
+    observed.q.copy_from(q);
+    monitor.update(&observed);
     let mut links = monitor.result();
     for link in &mut links {
         link.damage = None;
@@ -309,10 +309,8 @@ fn placed(robot: &Robot, links: &[LinkStress]) -> Result<Vec<PlacedGauge>, Error
             Ok::<_, StressError>((site, strain.transpose()?))
         };
         let entry = if gauge.grid.is_some() { "strain_gauge" } else { "stress_point" };
-        let (site, strain) = place().map_err(|error| Error::File {
-            path: robot.path.clone(),
-            what: format!("{entry} {:?}: {error}", gauge.name),
-        })?;
+        let (site, strain) =
+            place().map_err(|error| unusable(&robot.path, format_args!("{entry} {:?}: {error}", gauge.name)))?;
         gauges.push(PlacedGauge { name: gauge.name.clone(), link: number, site, strain });
     }
     Ok(gauges)
@@ -350,8 +348,8 @@ fn fields_and_map(
     Ok(Some((fields, map.map_err(|error| unusable(path, error))?)))
 }
 
-fn unusable(path: &Path, what: impl ToString) -> Error {
-    Error::File { path: path.to_owned(), what: what.to_string() }
+fn unusable(path: &Path, what: impl std::fmt::Display) -> Error {
+    Error::Modelling(format!("{}: {what}", path.display()))
 }
 
 /// Returns the parts without the bodies attached to the link, whose loads act at its interfaces.

@@ -8,7 +8,7 @@ use super::surface::{Skin, skin};
 
 /// Relation of a node set to the surface of a mesh.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Seat {
+pub struct SurfaceNodes {
     /// Number of surface faces with all their corners in the set.
     pub faces: usize,
     /// Number of patches of these faces, each connected through its nodes.
@@ -48,30 +48,30 @@ impl Surface {
     }
 
     /// Checks the nodes of an interface, which must be sorted.
-    pub fn seat(&self, nodes: &[u32]) -> Seat {
+    pub fn surface_nodes(&self, nodes: &[u32]) -> SurfaceNodes {
         let is_in = |node: &u32| nodes.binary_search(node).is_ok();
-        let mut seat = Seat::default();
+        let mut surface_nodes = SurfaceNodes::default();
         let (mut middles, mut on_faces): (BTreeSet<u32>, BTreeSet<u32>) = Default::default();
         let mut patches = Patches::default();
         for face in self.skin.faces().filter(|face| face.corners.iter().all(is_in)) {
-            seat.faces += 1;
+            surface_nodes.faces += 1;
             middles.extend(face.midsides);
             on_faces.extend(face.corners);
             patches.join(face.corners);
         }
-        seat.patches = patches.count();
-        seat.middles = middles.len();
-        seat.missing = middles.iter().copied().filter(|node| !is_in(node)).collect();
+        surface_nodes.patches = patches.count();
+        surface_nodes.middles = middles.len();
+        surface_nodes.missing = middles.iter().copied().filter(|node| !is_in(node)).collect();
         for node in nodes {
             if self.is_beam[*node as usize] {
-                seat.on_beams += 1;
+                surface_nodes.on_beams += 1;
             } else if !self.is_outside[*node as usize] {
-                seat.inside += 1;
+                surface_nodes.inside += 1;
             } else if !on_faces.contains(node) && !middles.contains(node) {
-                seat.stray += 1;
+                surface_nodes.stray += 1;
             }
         }
-        seat
+        surface_nodes
     }
 }
 
@@ -124,12 +124,15 @@ mod tests {
                 mesh.blocks[0].elements().flat_map(|e| e[..super::super::faces::corner_count(kind)].to_vec()).collect();
             let only: Vec<u32> = face.iter().copied().filter(|node| corners.contains(node)).collect();
             let surface = Surface::new(&mesh);
-            assert!(surface.seat(&face).missing.is_empty(), "{kind:?}");
-            let seat = surface.seat(&only);
-            let mut whole = [only.clone(), seat.missing.clone()].concat();
+            assert!(surface.surface_nodes(&face).missing.is_empty(), "{kind:?}");
+            let surface_nodes = surface.surface_nodes(&only);
+            let mut whole = [only.clone(), surface_nodes.missing.clone()].concat();
             whole.sort_unstable();
             assert_eq!(whole, face, "{kind:?}");
-            assert_eq!((seat.missing.len(), seat.patches, seat.stray, seat.inside), (seat.middles, 1, 0, 0));
+            assert_eq!(
+                (surface_nodes.missing.len(), surface_nodes.patches, surface_nodes.stray, surface_nodes.inside),
+                (surface_nodes.middles, 1, 0, 0)
+            );
         }
     }
 
@@ -137,11 +140,11 @@ mod tests {
     fn an_edge_is_no_seat_two_ends_are_two_patches_and_inner_nodes_are_counted() {
         let mesh = cube(ElementKind::Hex8, [4, 2, 2], false, |u| u);
         let surface = Surface::new(&mesh);
-        let edge = surface.seat(&nodes_at(&mesh, |p| p.x == 0.0 && p.y == 0.0));
+        let edge = surface.surface_nodes(&nodes_at(&mesh, |p| p.x == 0.0 && p.y == 0.0));
         assert_eq!((edge.faces, edge.stray), (0, 3));
-        let ends = surface.seat(&nodes_at(&mesh, |p| p.x == 0.0 || p.x == 1.0));
+        let ends = surface.surface_nodes(&nodes_at(&mesh, |p| p.x == 0.0 || p.x == 1.0));
         assert_eq!((ends.faces, ends.patches), (8, 2));
-        let inner = surface.seat(&nodes_at(&mesh, |p| p.x == 0.5));
+        let inner = surface.surface_nodes(&nodes_at(&mesh, |p| p.x == 0.5));
         assert_eq!((inner.inside, inner.faces), (1, 0));
     }
 }

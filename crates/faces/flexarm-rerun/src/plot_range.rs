@@ -20,7 +20,7 @@ const APART: f64 = 20.0;
 /// Maximum relative growth of an axis for a third label.
 const FOR_A_LABEL: f64 = 0.2;
 /// Maximum relative growth of an axis for the legend.
-const MAX_ROOM: f64 = 0.8;
+const MAX_LEGEND_GROWTH: f64 = 0.8;
 
 /// Minimum and maximum of curves over the run, in pieces of equal numbers of rows.
 #[derive(Clone, Debug, Default)]
@@ -90,11 +90,11 @@ pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangeme
         return None;
     }
     // A constant curve still gets an axis.
-    let room = match MARGIN * (high - low) {
-        room if room > 0.0 => room,
+    let margin = match MARGIN * (high - low) {
+        margin if margin > 0.0 => margin,
         _ => 0.5 * high.abs().max(1e-6),
     };
-    let base = labelled([low - room, high + room]);
+    let base = labelled([low - margin, high + margin]);
     let [row, frame, letter, beside] = LEGEND;
     let width = (names.iter().max().copied().unwrap_or(0) as f64 * letter + beside) / PLOT[0];
     let height = (names.len() as f64 * row + frame) / PLOT[1];
@@ -117,7 +117,7 @@ pub(crate) fn arrange(curves: &[&Envelope], names: &[usize]) -> Option<Arrangeme
     let length = |[low, high]: [f64; 2]| high - low;
     let least = found.into_iter().min_by(|(_, a), (_, b)| length(*a).total_cmp(&length(*b)));
     let (corner, range) = least.unwrap_or(found[0]);
-    let fits = length(range) <= (1.0 + MAX_ROOM) * length(base);
+    let fits = length(range) <= (1.0 + MAX_LEGEND_GROWTH) * length(base);
     Some(Arrangement { corner, range: if fits { range } else { base } })
 }
 
