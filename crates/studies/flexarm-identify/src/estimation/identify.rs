@@ -353,10 +353,13 @@ fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> Fitte
     }
 }
 
+/// Parameters and their weights.
+type Combination = Vec<(usize, f64)>;
+
 /// Returns the directions of the parameters, over their prior deviations, of which the readings
 /// know no more than the prior, as parameters and weights, largest weight first, and the groups of
 /// parameters that these directions connect.
-fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> (Vec<Vec<(usize, f64)>>, Vec<Vec<usize>>) {
+fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> (Vec<Combination>, Vec<Vec<usize>>) {
     let std: Vec<f64> = unknowns[..p].iter().map(|unknown| unknown.prior.map_or(1.0, |(_, std)| std)).collect();
     let over = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (std[i] * std[j]));
     let eigen = SymmetricEigen::new(over);
