@@ -1,6 +1,6 @@
 //! Caveats about an identification.
 
-use crate::estimation::{Identified, MeasuredArm, NominalArm, FittedParameter, ReadingKind};
+use crate::estimation::{FittedParameter, Identified, MeasuredArm, NominalArm, ReadingKind};
 use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
@@ -96,38 +96,46 @@ pub(super) fn combinations(found: &Identified) -> Vec<String> {
 
 /// Lists parameters in words; those of one kind as one.
 fn in_words<'a>(names: impl Iterator<Item = &'a str>) -> String {
-    let mut kinds: Vec<(String, Vec<String>)> = Vec::new();
+    let mut kinds: Vec<(&str, Vec<&str>, Vec<String>)> = Vec::new();
     for name in names {
-        let (what, whose) = words(name);
-        match kinds.iter_mut().find(|(own, _)| *own == what) {
-            Some((_, all)) => all.push(whose),
-            None => kinds.push((what, vec![whose])),
+        let (what, axis, whose) = words(name);
+        match kinds.iter_mut().find(|(own, axes, _)| *own == what && axes[0] == axis) {
+            Some((.., all)) => all.push(whose),
+            None => kinds.push((what, vec![axis], vec![whose])),
         }
     }
-    let all = kinds.iter().map(|(what, whose)| format!("{what} of {}", whose.join(", ")));
-    all.collect::<Vec<_>>().join("; ")
+    // Axes of the same parts as one.
+    let mut merged: Vec<(&str, Vec<&str>, Vec<String>)> = Vec::new();
+    for (what, axes, whose) in kinds {
+        match merged.iter_mut().find(|(own, _, all)| *own == what && *all == whose) {
+            Some((_, all, _)) => all.extend(axes),
+            None => merged.push((what, axes, whose)),
+        }
+    }
+    let one = |(what, axes, whose): &(&str, Vec<&str>, Vec<String>)| {
+        format!("{} of {}", format!("{what} {}", axes.join(", ")).trim_end(), whose.join(", "))
+    };
+    merged.iter().map(one).collect::<Vec<_>>().join("; ")
 }
 
-/// Returns what a parameter is, and of what.
-fn words(name: &str) -> (String, String) {
+/// Returns what a parameter is, its axis, and of what it is.
+fn words(name: &str) -> (&str, &str, String) {
     let (kind, rest) = name.split_once('.').unwrap_or(("parameter", name));
     let (whose, last) = rest.rsplit_once('.').unwrap_or(("", rest));
-    let (what, whose) = match (kind, last) {
-        ("joint" | "tcp", "x" | "y" | "z") => (format!("shift along {last}"), whose),
-        ("joint" | "tcp", "roll" | "rx") => ("rotation about x".into(), whose),
-        ("joint" | "tcp", "pitch" | "ry") => ("rotation about y".into(), whose),
-        ("joint" | "tcp", "yaw" | "rz") => ("rotation about z".into(), whose),
-        ("link", "x" | "y" | "z") => {
-            (format!("centre of mass along {last}"), whose.strip_suffix(".com").unwrap_or(whose))
-        }
-        _ => (last.to_owned(), whose.strip_suffix(".gearbox").unwrap_or(whose)),
+    let (what, axis) = match (kind, last) {
+        ("joint" | "tcp", "x" | "y" | "z") => ("shift along", last),
+        ("joint" | "tcp", "roll" | "rx") => ("rotation about", "x"),
+        ("joint" | "tcp", "pitch" | "ry") => ("rotation about", "y"),
+        ("joint" | "tcp", "yaw" | "rz") => ("rotation about", "z"),
+        ("link", "x" | "y" | "z") => ("centre of mass along", last),
+        _ => (last, ""),
     };
-    let of = match (whose, kind) {
-        ("", "tcp") => "the tool".to_owned(),
-        ("", _) => format!("the {kind}"),
-        _ => whose.to_owned(),
+    let whose = match (kind, whose) {
+        ("tcp", "") => "the tool".to_owned(),
+        (_, "") => format!("the {kind}"),
+        _ => [".com", ".gearbox"].iter().find_map(|end| whose.strip_suffix(end)).unwrap_or(whose).to_owned(),
     };
-    (what, of)
+    (what, axis, whose)
 }
 
 /// Returns a caveat about gear effects that the fit does not include.

@@ -56,8 +56,8 @@ use flexarm_run::caveat::Use;
 use flexarm_run::caveat::warnings;
 
 pub use self::answer::{
-    Compared, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves,
-    ShapeFigures, Suspicious, Weight,
+    Compared, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves, ShapeFigures,
+    Suspicious, Weight,
 };
 pub use self::encoders::EncoderFigures;
 pub use self::error::IdentifyFileError;
@@ -65,7 +65,12 @@ pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_mea
 
 /// Returns the arm as model for the identification: tree, springs, TCP.
 pub fn nominal(arm: &Arm) -> NominalArm {
-    parameters::nominal(arm)
+    NominalArm {
+        model: arm.model.clone(),
+        springs: arm.springs.clone(),
+        tool: arm.tcp.clone(),
+        coupling: arm.gear_coupling().cloned(),
+    }
 }
 
 /// Returns the identifiable parameters of an arm, with the names that files and `--fit` use.

@@ -1,7 +1,7 @@
 //! Identifiable parameters of a robot file: their names, their effect on the arm, and their places
 //! in the file. `docs/identify.md` lists the names.
 
-use crate::estimation::{Effect, LinkPart, NominalArm, Parameter, SpringPart};
+use crate::estimation::{Effect, LinkPart, Parameter, SpringPart};
 use flexarm_flexlink::{GearStiffness, SEAT};
 use flexarm_kinematics::{JointMotion, LinkInertia, SpatialInertia};
 use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
@@ -430,16 +430,6 @@ fn mounting_parameters(robot: &Robot, springs: &[usize]) -> Vec<Candidate> {
 
 fn is_diagonal(K: &nalgebra::Matrix6<f64>) -> bool {
     (0..6).all(|i| (0..6).all(|j| i == j || K[(i, j)] == 0.0))
-}
-
-/// Converts the flexible robot to the plant of the estimation.
-pub(crate) fn nominal(arm: &Arm) -> NominalArm {
-    NominalArm {
-        model: arm.model.clone(),
-        springs: arm.springs.clone(),
-        tool: arm.tcp.clone(),
-        coupling: arm.gear_coupling().cloned(),
-    }
 }
 
 /// Whether a pattern selects a parameter for fitting.

@@ -292,9 +292,8 @@ fn plans(
     candidates: &[Reading],
     options: &PlanOptions,
 ) -> Result<[Plan; 2], Error> {
-    let plan_of = |candidates: &[Reading]| {
-        plan(nominal, fitted, candidates, options).map_err(|error| refused(error.to_string()))
-    };
+    let plan_of =
+        |candidates: &[Reading]| plan(nominal, fitted, candidates, options).map_err(|error| refused(error.to_string()));
     let best = plan_of(candidates)?;
     if best.chosen.len() < options.count {
         let text = format!("only {} of {} readings are possible at these poses", best.chosen.len(), options.count);

@@ -242,11 +242,7 @@ fn put_entry(link: &mut dyn TableLike, place: (usize, usize), K: &Matrix6<f64>, 
 }
 
 /// Writes the pose of the tool, moved and rotated about its own axes by the identified values.
-fn put_tool(
-    file: &mut DocumentMut,
-    found: &[(FittedParameter, ParameterLocation)],
-    tool: (&str, &Pose),
-) -> Option<()> {
+fn put_tool(file: &mut DocumentMut, found: &[(FittedParameter, ParameterLocation)], tool: (&str, &Pose)) -> Option<()> {
     let mut shift = [0.0; 6];
     for (parameter, written) in found {
         if let ParameterLocation::Tool { axis } = written {

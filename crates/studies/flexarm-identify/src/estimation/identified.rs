@@ -94,61 +94,10 @@ pub struct Identified {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum IdentifyError {
-    /// No parameter or no reading.
-    #[error("{parameters} parameters and {rows} measured numbers: at least one of each is needed")]
-    Nothing {
-        /// Number of parameters.
-        parameters: usize,
-        /// Number of measured numbers.
-        rows: usize,
-    },
-    /// Too few measured places for an instrument.
-    #[error(
-        "instrument {instrument}: its pose requires at least three measured places that are not on one line, found \
-         {places}"
-    )]
-    Instrument {
-        /// Number of the instrument.
-        instrument: usize,
-        /// Number of its places.
-        places: usize,
-    },
-    /// Too few displacements to find the axes of an instrument.
-    #[error(
-        "instrument {instrument}: its axes require displacements with all three components along at least two \
-         directions, found {displacements}; add such readings, or give its orientation"
-    )]
-    Axes {
-        /// Number of the instrument.
-        instrument: usize,
-        /// Number of its displacements.
-        displacements: usize,
-    },
     /// The arm model has no solution for a reading.
     #[error(transparent)]
     Model(#[from] NoAnswer),
-    /// The readings do not determine an unknown of the measurement.
-    #[error(
-        "the readings do not determine {what}: measure at more different poses, in particular with different \
-         orientations of the tool"
-    )]
-    Untold {
-        /// Description of the unknown.
-        what: String,
-    },
-    /// The scatter cannot be estimated, because there are as many unknowns as numbers.
-    #[error(
-        "the {rows} numbers have no standard deviation and there are as many unknowns: the scatter cannot be \
-         estimated; give a standard deviation or measure more"
-    )]
-    NoScatter {
-        /// Number of measured numbers.
-        rows: usize,
-    },
-    /// A value is not finite.
-    #[error(
-        "a residual or a derivative is not finite: a value, a standard deviation or an uncertainty is too large or \
-         too small"
-    )]
-    NotFinite,
+    /// The readings do not suffice, or are not finite; with what is missing.
+    #[error("{0}")]
+    Readings(String),
 }

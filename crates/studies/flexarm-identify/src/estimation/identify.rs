@@ -7,7 +7,7 @@
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
-use crate::estimation::identified::{HeldOut, Identified, IdentifyError, ModelError, FittedParameter};
+use crate::estimation::identified::{FittedParameter, HeldOut, Identified, IdentifyError, ModelError};
 use crate::estimation::least_squares::{
     Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, misfit, solve,
 };
@@ -26,6 +26,10 @@ const LEARNT: f64 = 0.5;
 const CONNECTED: f64 = 0.15;
 /// Normal quantile of a 95 % interval.
 const INTERVAL: f64 = 1.96;
+
+/// Message about a number that is not finite.
+const NOT_FINITE: &str = "a residual or a derivative is not finite: a value, a standard deviation or an uncertainty is \
+                          too large or too small";
 
 /// Options of an identification.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +62,9 @@ pub fn identify(
 ) -> Result<Identified, IdentifyError> {
     let rows = measurements.rows();
     if rows == 0 || parameters.is_empty() {
-        return Err(IdentifyError::Nothing { parameters: parameters.len(), rows });
+        let text =
+            format!("{} parameters and {rows} measured numbers: at least one of each is needed", parameters.len());
+        return Err(IdentifyError::Readings(text));
     }
     let mut unknowns = unknowns(parameters, measurements);
     let start: Vec<f64> = parameters.iter().zip(&unknowns).map(|(p, u)| p.search(u.start).0).collect();
@@ -77,7 +83,7 @@ pub fn identify(
     let sound = |p: &FittedParameter| p.value.is_finite() && (p.std.is_finite() || !p.identifiable);
     match found.parameters.iter().all(sound) {
         true => Ok(found),
-        false => Err(IdentifyError::NotFinite),
+        false => Err(IdentifyError::Readings(NOT_FINITE.into())),
     }
 }
 
@@ -145,9 +151,17 @@ impl Fit<'_> {
         let problem = InUnknowns(MeasuredArm { nominal, parameters, measurements });
         solve(&problem, &measurements.noise(), unknowns, search, watch).map_err(|error| match error {
             SolveError::Model(error) => IdentifyError::Model(error),
-            SolveError::Nuisance(k) => IdentifyError::Untold { what: own_name(measurements, k - parameters.len()) },
-            SolveError::NoScatter => IdentifyError::NoScatter { rows: measurements.rows() },
-            SolveError::NotFinite => IdentifyError::NotFinite,
+            SolveError::Nuisance(k) => IdentifyError::Readings(format!(
+                "the readings do not determine {}: measure at more different poses, in particular with different \
+                 orientations of the tool",
+                own_name(measurements, k - parameters.len())
+            )),
+            SolveError::NoScatter => IdentifyError::Readings(format!(
+                "the {} numbers have no standard deviation and there are as many unknowns: the scatter cannot be \
+                 estimated; give a standard deviation or measure more",
+                measurements.rows()
+            )),
+            SolveError::NotFinite => IdentifyError::Readings(NOT_FINITE.into()),
         })
     }
 
@@ -339,10 +353,13 @@ fn estimate(parameter: &Parameter, unknown: &Unknown, z: f64, std: f64) -> Fitte
     }
 }
 
+/// Parameters and their weights.
+type Combination = Vec<(usize, f64)>;
+
 /// Returns the directions of the parameters, over their prior deviations, of which the readings
 /// know no more than the prior, as parameters and weights, largest weight first, and the groups of
 /// parameters that these directions connect.
-fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> (Vec<Vec<(usize, f64)>>, Vec<Vec<usize>>) {
+fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> (Vec<Combination>, Vec<Vec<usize>>) {
     let std: Vec<f64> = unknowns[..p].iter().map(|unknown| unknown.prior.map_or(1.0, |(_, std)| std)).collect();
     let over = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (std[i] * std[j]));
     let eigen = SymmetricEigen::new(over);

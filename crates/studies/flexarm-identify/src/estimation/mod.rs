@@ -24,7 +24,7 @@ mod sensitivity;
 mod slips;
 
 pub use encoders::{GearEstimate, GearOutput, gear_stiffness};
-pub use identified::{HeldOut, Identified, IdentifyError, ModelError, FittedParameter};
+pub use identified::{FittedParameter, HeldOut, Identified, IdentifyError, ModelError};
 pub use identify::{IdentifyOptions, identify};
 pub use least_squares::{Loss, Noise, Progress, Residuals, Search, Solution, SolveError, Unknown, solve};
 pub use measurement::{MeasuredArm, NoAnswer};

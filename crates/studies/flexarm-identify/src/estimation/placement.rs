@@ -25,13 +25,25 @@ pub(crate) fn placed(nominal: &NominalArm, measurements: &Measurements) -> Resul
                     own && reading.position().is_some()
                 };
                 let [world, own] = both_points(nominal, measurements, seen)?;
-                let too_few = || IdentifyError::Instrument { instrument: number, places: world.len() };
+                let too_few = || {
+                    IdentifyError::Readings(format!(
+                        "instrument {number}: its pose requires at least three measured places that are not on one \
+                         line, found {}",
+                        world.len()
+                    ))
+                };
                 placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
             }
             Instrument::Axes(_) if !said => {
                 let seen = |reading: &Reading| seen_in_axes(&reading.kind, number);
                 let [world, own] = both_points(nominal, measurements, seen)?;
-                let too_few = || IdentifyError::Axes { instrument: number, displacements: world.len() };
+                let too_few = || {
+                    IdentifyError::Readings(format!(
+                        "instrument {number}: its axes require displacements with all three components along at least \
+                         two directions, found {}; add such readings, or give its orientation",
+                        world.len()
+                    ))
+                };
                 placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
             }
             _ => {}
