@@ -1,7 +1,8 @@
 //! Building blocks of errors and caveats: settings named in messages, which each front end names in
 //! its own way ([`Setting`]); what is found in an input or a result ([`Finding`]) and where in a file
-//! ([`Place`]); the party responsible for an error ([`Fault`]); ranges of physical quantities ([`Quantity`]); choices by a
-//! word ([`Words`]); TOML messages without type names ([`without_types`]); escaping of foreign text
+//! ([`Place`]); the party responsible for an error ([`Fault`]); ranges of physical quantities
+//! ([`Quantity`]); choices by a word ([`Words`]); lists that are not longer than their types
+//! ([`exact`]); TOML messages without type names ([`without_types`]); escaping of foreign text
 //! for each kind of output ([`written`]).
 //!
 //! "Try a smaller step" refers to a struct field in Rust, to a keyword argument in Python and to a
@@ -19,6 +20,7 @@
 //! Not here: values, defaults and meaning of the settings, which are fields of the crate they
 //! belong to; the kinds of findings and their references, which are in the crates that find them.
 
+mod exact;
 mod fault;
 pub mod finding;
 mod gathered;
@@ -32,6 +34,7 @@ pub mod written;
 use std::fmt;
 use std::sync::OnceLock;
 
+pub use exact::exact;
 pub use fault::Fault;
 pub use finding::{Finding, Severity};
 pub use gathered::gathered;

@@ -59,9 +59,13 @@ use flexarm::settings::written::message;
 /// This function assumes that it owns the process: messages name settings by its flags, and signals
 /// stop the current command.
 pub fn run(line: Vec<OsString>) -> u8 {
-    if let Some(processors) = fewer_threads() {
-        // Fails only if there is a pool already, which then stays as it is.
-        let _ = rayon::ThreadPoolBuilder::new().num_threads(processors).build_global();
+    if let Err(error) = start_threads() {
+        // Nothing can be done about a closed stream.
+        let _ = writeln!(
+            anstream::stderr(),
+            "error: the system starts no thread ({error}): raise the limits of memory and processes (ulimit -v, -u)"
+        );
+        return 1;
     }
     signals::turn_into_errors();
     flexarm::settings::name_settings(flags::NAMES);
@@ -116,6 +120,33 @@ pub fn whole_help(line: &[OsString]) -> StyledStr {
     let about = command.get_long_about().or(command.get_about()).cloned();
     let command = command.clone().mut_args(shown).about(Resettable::from(about));
     command.after_help(Resettable::from(examples)).render_help()
+}
+
+/// Starts the threads that share the work of a command: as many as there are processors, or fewer
+/// if the environment says so. Where the system starts only some of them, as under a limit of
+/// memory, these do all the work.
+///
+/// # Errors
+/// If it starts none.
+fn start_threads() -> std::io::Result<()> {
+    if cfg!(target_family = "wasm") {
+        return Ok(()); // there are none
+    }
+    let mut started: std::io::Result<()> = Err(std::io::ErrorKind::OutOfMemory.into());
+    let spawn = |thread: rayon::ThreadBuilder| {
+        match std::thread::Builder::new().spawn(|| thread.run()) {
+            Ok(_) => started = Ok(()),
+            Err(error) if started.is_err() => started = Err(error),
+            Err(_) => {}
+        }
+        Ok(())
+    };
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(fewer_threads().unwrap_or(0));
+    match pool.spawn_handler(spawn).build_global() {
+        Ok(()) => started,
+        // There is a pool already, which stays as it is.
+        Err(_) => Ok(()),
+    }
 }
 
 /// Variable of the environment with the number of threads.

@@ -175,12 +175,119 @@ fn slips_in_mountings_balancers_axes_and_drives_are_told() {
             ("zero_deg = -90.0", "zero_deg = -1.5708", "unusual", "radians?"),
             ("position_gain = 20.0", "position_gain = 0.02", "position-gain", "0.02 1/s"),
             ("velocity_gain = 40000.0", "velocity_gain = 40.0", "velocity-gain", "kN m s/rad?"),
+            ("position_gain = 20.0", "position_gain = 20.0, integral_gain = 50.0", "unusual", "integral over"),
+            ("position_gain = 20.0", "position_gain = 20.0, integral_gain = 5e9", "unusual", "integral over"),
             ("torque_limit = 3000.0", "torque_limit = 3e6", "unusual", "torque_limit of joint \"joint_1\""),
             ("regularisation = 0.01", "regularisation = 1e-9", "unusual", "drive.friction.regularisation"),
             ("stribeck_velocity = 0.05", "stribeck_velocity = 57.0", "friction-smoothing", "degrees?"),
             ("damping = [5000.0, ", "damping = [0.005, ", "gear-damping", "joint \"joint_3\""),
         ],
     );
+}
+
+/// A decimal comma makes one value two: `[0, 0, 0,35]`. A list that is too long loses none of its
+/// values without a word.
+#[test]
+fn lists_that_are_longer_than_their_keys_take_are_refused() {
+    let folder = Folder::new("lists");
+    let sound = drives_with_entries();
+    let refused = "expected 3: leave the others out; decimals have a point";
+    folder.tries(
+        &sound,
+        &[
+            ("xyz = [0.0, 0.0, 0.35]", "xyz = [0, 0, 0,35]", "robot-file", refused),
+            ("gravity = [0.0, 0.0, -9.81]", "gravity = [0, 0, -9,81]", "robot-file", refused),
+            ("com = [0.0, 0.0, 0.25]", "com = [0.0, 0.0, 0.0, 0.25]", "robot-file", refused),
+            ("6.25, 0.0, 0.0, 0.0]", "6.25, 0.0, 0.0, 0.0, 0.0]", "robot-file", "the list has 7 values, expected 6"),
+            (
+                "from = { link = \"link_1\", xyz = [0.0,",
+                "from = { link = \"link_1\", xyz = [0,0, 0,",
+                "robot-file",
+                "4 values",
+            ),
+            ("curve = [[-2.4, 50.0]", "curve = [[-2,4, 50.0]", "robot-file", "the list has 3 values, expected 2"),
+            (
+                "gearbox = { stiffness = 3376721.9",
+                "gearbox = { seat = [1e7, 1e7, 1e7], stiffness = 3376721.9",
+                "robot-file",
+                "3 values",
+            ),
+        ],
+    );
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap();
+    let (loads, path) = (folder.0.join("loads.toml"), folder.0.join("path.toml"));
+    std::fs::write(&loads, "format = 1\n[[load]]\nkind = \"step\"\nforce = [0,0, 0.0, -200.0]\n").unwrap();
+    let text = std::fs::read_to_string(project.join("trajectories/milling_square.toml")).unwrap();
+    std::fs::write(&path, text.replacen("line = [300.0, 0.0, 0.0]", "line = [300,0, 0.0, 0.0]", 1)).unwrap();
+    let robot = project.join("robots/kr210/robot.toml");
+    for (motion, loads) in [(None, Some(&*loads)), (Some(&*path), None)] {
+        let found = check_with_loads(&robot, motion, loads, &LoadOptions::default());
+        assert!(
+            found.iter().any(|f| f.severity == flexarm::Severity::Error && f.message.contains(refused)),
+            "{found:?}"
+        );
+    }
+}
+
+/// Seat and shaft turn the same link about the same axes: the message names them, not a link that
+/// lacks a mass.
+#[test]
+fn a_seat_beside_three_stiffnesses_is_named_where_modes_need_inertia() {
+    let folder = Folder::new("seat");
+    let sound = drives_with_entries();
+    let three = "gearbox = { seat = [1e7, 1e7], stiffness = [1e7, 1e7, 3376721.9], damping = [1e3, 1e3, 4481.0] }";
+    folder.tries(
+        &sound,
+        &[(
+            "gearbox = { stiffness = 3376721.9, damping = 4481.0 }",
+            three,
+            "no-equilibrium",
+            "its seat and its three stiffnesses",
+        )],
+    );
+}
+
+#[test]
+fn limits_of_a_urdf_in_other_units_are_told() {
+    let folder = Folder::new("limits");
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).ancestors().nth(3).unwrap();
+    let text = std::fs::read_to_string(project.join("robots/kr210/drives.toml")).unwrap();
+    let text = text.lines().filter(|line| !line.starts_with("default_trajectory")).collect::<Vec<_>>().join("\n");
+    let urdf = std::fs::read_to_string(project.join("robots/kr210/kr210.urdf")).unwrap();
+    // Multiplies the values of some attributes of <limit>.
+    let scaled = |keys: &[&str], factor: f64| {
+        let change = |line: &str| {
+            let mut line = line.to_owned();
+            for key in keys.iter().filter(|_| line.contains("<limit ")) {
+                let Some((before, rest)) = line.split_once(&format!("{key}=\"")) else { continue };
+                let (value, after) = rest.split_once('"').unwrap();
+                let value = value.parse::<f64>().unwrap() * factor;
+                line = format!("{before}{key}=\"{value}\"{after}");
+            }
+            line + "\n"
+        };
+        urdf.lines().map(change).collect::<String>()
+    };
+    let told = |urdf: &str| {
+        std::fs::write(folder.0.join("kr210.urdf"), urdf).unwrap();
+        std::fs::write(folder.0.join("robot.toml"), &text).unwrap();
+        let found = check(&folder.0.join("robot.toml"), None, &LoadOptions::default());
+        let limits = found.into_iter().filter(|f| ["speed-limit", "joint-range"].contains(&f.code.as_str()));
+        limits.map(|f| f.message).collect::<Vec<_>>()
+    };
+    assert_eq!(told(&urdf), [""; 0]);
+    let (turn, degree) = (60.0 / std::f64::consts::TAU, 180.0 / std::f64::consts::PI);
+    for (keys, factor, number, part) in [
+        (&["velocity"][..], turn, 6, "1/min?"),
+        (&["velocity"], degree, 6, "degrees?"),
+        (&["velocity"], 1.0 / degree, 1, "converted to radians twice?"),
+        (&["lower", "upper"], degree, 6, "degrees?"),
+        (&["lower", "upper"], 1.0 / degree, 4, "converted to radians twice?"),
+    ] {
+        let found = told(&scaled(keys, factor));
+        println!("{keys:?} times {factor}: {found:?}");
+        assert!(found.len() == number && found.iter().all(|message| message.contains(part)), "{found:?}");
+    }
 }
 
 #[test]
@@ -213,23 +320,40 @@ fn slips_in_loads_and_paths_are_told() {
     let robot = project.join("robots/kr210/robot.toml");
     let told = |motion: Option<&Path>, loads: Option<&Path>| -> Vec<String> {
         let found = check_with_loads(&robot, motion, loads, &LoadOptions::default()).into_iter();
-        found.filter(|f| f.severity != flexarm::Severity::Note && f.code != "missing-mesh").map(|f| f.message).collect()
+        found.filter(|f| f.code != "missing-mesh").map(|f| f.message).collect()
     };
     let impulse = "format = 1\n[[load]]\nkind = \"impulse\"\nstart = 1.0\nduration = 0.002\nforce = [0.0, 5.0, 0.0]\n";
     let milling = "format = 1\n[[load]]\nkind = \"milling\"\nteeth = 4\nspindle_rpm = 600.0\nforce = [9.0, 9.0, 0.0]\n";
+    let sine = "format = 1\n[[load]]\nkind = \"sine\"\nfrequency = 12.0\nforce = [9.0, 9.0, 0.0]\n";
     let path = std::fs::read_to_string(project.join("trajectories/milling_square.toml")).unwrap();
+    // The same moves in degrees and in radians.
+    let moves = "format = 1\nunit = \"deg\"\njoints = [\"joint_1\"]\nstart = [0.0]\nprofile = \"s-curve\"\nacceleration = 250.0\n\
+                 jerk = 2500.0\nspeed = 0.1\n[limits]\njoint_1 = { velocity = 110.0 }\n[[move]]\nto = [50.0]\nhold = 0.5\n"
+        .to_owned();
+    let changes = [("deg", "rad"), ("250.0", "4.4"), ("2500.0", "44.0"), ("110.0", "1.92"), ("[50.0]", "[0.9]")];
+    let radians = changes.iter().fold(moves.clone(), |text, (from, to)| text.replacen(from, to, 1));
     let (loads, motion) = (folder.0.join("loads.toml"), folder.0.join("path.toml"));
     for (sound, from, to, part) in [
-        (impulse, "0.002", "2.0", "the duration of an impulse is 2 s"),
-        (milling, "600.0", "6.0", "the spindle speed of a load is 6 1/min"),
+        (impulse, "0.002", "2.0", "load.duration is 2 s"),
+        (milling, "600.0", "6.0", "load.spindle_rpm is 6 1/min"),
+        (milling, "teeth = 4", "teeth = 400", "load.teeth is 400"),
+        (sine, "12.0", "12000.0", "load.frequency is 12000 Hz"),
         (&*path, "speed = 250.0\nacc", "speed = 15000.0\nacc", "mm/min for mm/s?"),
         (&*path, "acceleration = 2000.0", "acceleration = 2.0", "mm/s2 for m/s2?"),
         (&*path, "jerk = 40000.0", "jerk = 40.0", "mm/s3 for m/s3?"),
         (&*path, "joint_speed = 0.3", "joint_speed = 30.0", "per cent?"),
         (&*path, "blend = 8.0", "blend = 0.008", "its blend is"),
+        (&*path, "{ acceleration = 300.0 }", "{ acceleration = 5.2 }", "the time to its full speed"),
+        (&*path, "dwell = 0.3", "dwell = 300.0", "rests for 300.2 s"),
+        (&*moves, "velocity = 110.0", "velocity = 1.92", "its speed limit over that of the robot"),
+        (&*moves, "acceleration = 250.0", "acceleration = 4.4", "the time to its full speed"),
+        (&*moves, "jerk = 2500.0", "jerk = 44.0", "the time to its full acceleration"),
+        (&*moves, "hold = 0.5", "hold = 500.0", "milliseconds?"),
+        (&*radians, "velocity = 1.92", "velocity = 110.0", "its speed limit over that of the robot"),
+        (&*radians, "acceleration = 4.4", "acceleration = 250.0", "the time to its full speed"),
     ] {
         assert!(sound.contains(from), "{from}");
-        let is_path = sound.contains("[path]");
+        let is_path = sound.contains("[[move]]");
         let tell = |text: &str| {
             std::fs::write(if is_path { &motion } else { &loads }, text).unwrap();
             if is_path { told(Some(&motion), None) } else { told(None, Some(&loads)) }

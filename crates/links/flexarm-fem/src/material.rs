@@ -136,6 +136,13 @@ impl Material {
         Ok(())
     }
 
+    /// Returns the plausible Young's moduli of a material of its density (Pa).
+    pub fn usual_moduli(&self) -> RangeInclusive<f64> {
+        let (soft, light) = ELASTOMERS;
+        let least = if self.rho < light { soft } else { *MODULI.start() };
+        least..=*MODULI.end()
+    }
+
     /// Warns about constants that pass [`Self::check`] but are implausible for a robot; usually
     /// because of a wrong unit.
     ///
@@ -146,14 +153,15 @@ impl Material {
             true => String::new(),
             false => format!(" ({:.4e} in units {units})", value / unit),
         };
-        if !MODULI.contains(&self.E) {
+        let moduli = self.usual_moduli();
+        if !moduli.contains(&self.E) {
             warnings.push(format!(
                 "Young's modulus E is {:.3e} Pa{}; solids have {:.0e} to {:.1e} Pa{}",
                 self.E,
                 written(self.E, units.stress()),
-                MODULI.start(),
-                MODULI.end(),
-                likely(self.E, &MODULI, &MODULUS_SLIPS)
+                moduli.start(),
+                moduli.end(),
+                likely(self.E, &moduli, &MODULUS_SLIPS)
             ));
         }
         if !DENSITIES.contains(&self.rho) {
@@ -180,7 +188,9 @@ impl Material {
 }
 
 /// Plausible Young's moduli, from soft plastics to diamond, Pa.
-const MODULI: RangeInclusive<f64> = 1e8..=1.2e12;
+const MODULI: RangeInclusive<f64> = 1e8..=1.3e12;
+/// Minimum modulus of rubbers and printed elastomers (Pa), and their greatest density (kg/m³).
+const ELASTOMERS: (f64, f64) = (1e6, 1800.0);
 /// Plausible densities, from rigid foam to osmium, kg/m³.
 const DENSITIES: RangeInclusive<f64> = 20.0..=23_000.0;
 /// Plausible Poisson's ratios, from cork to stiff rubber.

@@ -12,6 +12,10 @@ const RELATIVE_SLACK: f64 = 1e-9;
 /// Absolute tolerance for limits near zero, rad or m (and their rates).
 const ABSOLUTE_SLACK: f64 = 1e-12;
 
+/// Tolerance of positions over the range of the joint: a curve through the rounded positions of a
+/// table passes a limit on which they lie by a part of their last digit.
+const ROUNDING: f64 = 1e-5;
+
 /// Limits of one joint; an infinite or NaN entry means no limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct JointLimits {
@@ -110,18 +114,22 @@ impl Trajectory {
         assert_eq!(limits.len(), n, "check_limits needs one JointLimits per joint of the trajectory");
         let mut violations = Vec::new();
         for ((joint, curve), limit) in self.joints().iter().zip(self.curves()).zip(limits) {
-            violations.extend(passed(joint, curve, LimitKind::Lower, limit.lower));
-            violations.extend(passed(joint, curve, LimitKind::Upper, limit.upper));
-            violations.extend(passed(joint, curve, LimitKind::Velocity, limit.velocity));
-            violations.extend(passed(joint, curve, LimitKind::Acceleration, limit.acceleration));
-            violations.extend(passed(joint, curve, LimitKind::Jerk, limit.jerk));
+            let range = limit.upper - limit.lower;
+            let slack = if range.is_finite() { ROUNDING * range } else { 0.0 };
+            violations.extend(passed(joint, curve, LimitKind::Lower, limit.lower, slack));
+            violations.extend(passed(joint, curve, LimitKind::Upper, limit.upper, slack));
+            violations.extend(passed(joint, curve, LimitKind::Velocity, limit.velocity, 0.0));
+            violations.extend(passed(joint, curve, LimitKind::Acceleration, limit.acceleration, 0.0));
+            violations.extend(passed(joint, curve, LimitKind::Jerk, limit.jerk, 0.0));
         }
         violations
     }
 }
 
 /// Checks one limit of one joint.
-fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64) -> Option<LimitViolation> {
+///
+/// * `rounding`: excess that does not count (rad or m).
+fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64, rounding: f64) -> Option<LimitViolation> {
     if !limit.is_finite() {
         return None;
     }
@@ -138,7 +146,8 @@ fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64) -> Option<Lim
     let [least, greatest] = curve.range(order);
     let beyond_upper = upper.map(|level| (greatest.value - level, greatest, level));
     let beyond_lower = lower.map(|level| (level - least.value, least, level));
-    let sides: Vec<_> = [beyond_upper, beyond_lower].into_iter().flatten().filter(|side| side.0 > slack).collect();
+    let sides: Vec<_> =
+        [beyond_upper, beyond_lower].into_iter().flatten().filter(|side| side.0 > slack.max(rounding)).collect();
     let (_, worst, level) = *sides.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let first = |&(_, _, level): &(f64, _, f64)| first_beyond(curve, order, level, upper == Some(level), slack);
     let since_s = sides.iter().map(first).fold(worst.time_s, f64::min);

@@ -18,6 +18,7 @@ use crate::error::TrajectoryError;
 use crate::leg::Leg;
 use crate::problem::PlanError;
 use crate::trajectory::Trajectory;
+use crate::warning::Warning;
 
 /// Message about a plan that lasts no time.
 const STILL: &str = "nothing moves and nothing is held, so the trajectory lasts 0 s; add a move or a hold";
@@ -54,7 +55,30 @@ pub struct MotionLimits {
 impl MotionLimits {
     /// No limits.
     pub const UNLIMITED: Self = Self { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
+
+    /// Returns the first limit that does not suit the others, as one in another unit.
+    ///
+    /// * `own`: maximum speed of the robot's joint (rad/s or m/s).
+    pub fn odd(&self, joint: &str, own: f64) -> Option<Warning> {
+        let found = [
+            ("its speed limit over that of the robot is", self.velocity / own, SPEED_RATIO),
+            ("the time to its full speed in s is", self.velocity / self.acceleration, FULL_SPEED_S),
+            ("the time to its full acceleration in s is", self.acceleration / self.jerk, FULL_ACCELERATION_S),
+        ];
+        let is_odd =
+            |value: f64, [low, high]: [f64; 2]| value.is_finite() && value > 0.0 && !(low..=high).contains(&value);
+        let (what, value, usual) = found.into_iter().find(|(_, value, usual)| is_odd(*value, *usual))?;
+        Some(Warning::OddLimit { joint: joint.to_owned(), what, value, usual })
+    }
 }
+
+/// Usual speed limit of a motion over that of the robot; a factor of 57 lies between degrees and
+/// radians.
+const SPEED_RATIO: [f64; 2] = [0.02, 10.0];
+/// Usual time to full speed (s): delta robots take 0.02, cranes 5.
+const FULL_SPEED_S: [f64; 2] = [0.01, 10.0];
+/// Usual time to full acceleration (s): the Franka arm takes 0.002.
+const FULL_ACCELERATION_S: [f64; 2] = [1e-3, 3.0];
 
 /// One move and the hold after it.
 #[derive(Debug, Clone, PartialEq)]

@@ -117,6 +117,17 @@ pub enum Warning {
     },
     /// The positions are those of a run.
     PositionsOfRun,
+    /// A limit in the file does not suit the others.
+    OddLimit {
+        /// Joint name.
+        joint: String,
+        /// Description of the ratio.
+        what: &'static str,
+        /// Ratio.
+        value: f64,
+        /// Usual range of the ratio.
+        usual: [f64; 2],
+    },
     /// The given duration makes a joint exceed an acceleration or jerk limit.
     ShorterThanLimitsAllow {
         /// Number of the move, counted from 1.
@@ -209,6 +220,11 @@ impl fmt::Display for Warning {
             Self::PositionsOfRun => f.write_str(
                 "the positions are those of the flexible robot of a run: where its drives give way, they hold what the \
                  gearboxes twist; the motion file of the run has the commanded ones",
+            ),
+            Self::OddLimit { joint, what, value, usual: [low, high] } => write!(
+                f,
+                "limits of joint {joint:?}: {what} {value:.2e}, usual are {low} to {high}: are speed, acceleration and jerk in the \
+                 unit of the file (deg or rad)?"
             ),
             Self::ShorterThanLimitsAllow { number, joint, quantity, value, limit } => write!(
                 f,

@@ -44,6 +44,8 @@
 //!
 //! Start at [`Trajectory::parse_toml`]. Not here: the mathematics of the moves ([`crate::Plan`]).
 
+use flexarm_settings::exact;
+
 use crate::error::TrajectoryError;
 use crate::limits::JointLimits;
 use crate::problem::{PlanError, Problem};
@@ -73,16 +75,17 @@ impl Trajectory {
         };
         let line = |offset: usize| place(text, offset).0;
         if has_samples(text) {
-            let file: SamplesFileToml = toml::from_str(text).map_err(unread)?;
+            let file: SamplesFileToml = toml::Deserializer::parse(text).and_then(exact).map_err(unread)?;
             if *file.format.get_ref() != 1 {
                 return Err(fail(Some(file.format.span().start), Problem::format(*file.format.get_ref())));
             }
             let read = samples_toml::trajectory(&file).map_err(|error| fail(error.offset, error.problem))?;
             return Ok(read.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)));
         }
-        let file: FileToml = toml::from_str(text).map_err(unread)?;
+        let file: FileToml = toml::Deserializer::parse(text).and_then(exact).map_err(unread)?;
 
-        let Checked { plan, move_offsets } = check(&file, limits).map_err(|error| fail(error.offset, error.problem))?;
+        let Checked { plan, odd, move_offsets } =
+            check(&file, limits).map_err(|error| fail(error.offset, error.problem))?;
         let planned = plan.build().map_err(|error| match error {
             TrajectoryError::Plan(error) => {
                 let offset = PlanError::move_number(&error).and_then(|number| move_offsets.get(number - 1).copied());
@@ -91,6 +94,7 @@ impl Trajectory {
             TrajectoryError::OutOfRange { joint, .. } => fail(None, Problem::out_of_range(&joint)),
             other => other,
         })?;
+        let planned = odd.into_iter().fold(planned, Self::with_note);
         Ok(planned.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)))
     }
 }

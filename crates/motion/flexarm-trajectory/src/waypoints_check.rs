@@ -15,6 +15,7 @@ use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
 use crate::polynomial::FARTHEST;
 use crate::problem::Problem;
 use crate::trajectory::StatedUnit;
+use crate::warning::Warning;
 use crate::waypoints_toml::{FileToml, LawToml, MoveToml, ProfileToml, Values};
 
 /// Default rounding of trapezoids.
@@ -26,9 +27,10 @@ pub(crate) struct Located {
     pub(crate) problem: Problem,
 }
 
-/// The plan and the offset of each move in the text.
+/// The plan, a limit that does not suit the others, and the offset of each move in the text.
 pub(crate) struct Checked {
     pub(crate) plan: Plan,
+    pub(crate) odd: Option<Warning>,
     pub(crate) move_offsets: Vec<usize>,
 }
 
@@ -59,7 +61,15 @@ pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Ch
         moves.push(planned);
     }
     let move_offsets = file.moves.iter().map(|entry| entry.span().start).collect();
-    Ok(Checked { plan: Plan { joints: context.joints, start, moves }, move_offsets })
+    // Without the fraction of the speed at which a move is made.
+    let of_joint = |(limits, (full, joint)): (&MotionLimits, (&MotionLimits, &String))| {
+        let own = known.iter().find(|(name, _)| name == joint).map_or(f64::INFINITY, |(_, robot)| robot.velocity);
+        MotionLimits { velocity: full.velocity, ..*limits }.odd(joint, own)
+    };
+    let odd = moves.iter().find_map(|planned: &PlannedMove| {
+        planned.limits.iter().zip(robot_limits.iter().zip(&context.joints)).find_map(of_joint)
+    });
+    Ok(Checked { plan: Plan { joints: context.joints, start, moves }, odd, move_offsets })
 }
 
 pub(crate) fn joint_names(joints: &Spanned<Vec<Spanned<String>>>) -> Result<Vec<String>, Located> {

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 
 use flexarm_settings::Finding;
-use flexarm_trajectory::{Plan, PlannedMove, Trajectory, TrajectoryError, Warning};
+use flexarm_trajectory::{JointLimits, Plan, PlannedMove, Trajectory, TrajectoryError, Warning};
 use proptest::prelude::*;
 
 fn parse(text: &str) -> Trajectory {
@@ -397,4 +397,25 @@ fn rounded_corners_jump_no_more_and_stay_near() {
     let long = corners.with_rounded_corners(10.0).unwrap();
     assert_eq!(long.velocity_jumps(), []);
     assert!(corners.with_rounded_corners(0.0).is_err() && corners.with_rounded_corners(f64::NAN).is_err());
+}
+
+/// Truth: the rounded motion stays on its limits; the spline through its rows passes them by a part of
+/// the last digit.
+#[test]
+fn a_motion_that_ends_on_its_limits_in_rounded_digits_does_not_pass_them() {
+    for (digits, unit) in [(6, "rad"), (4, "deg")] {
+        let mut text = format!("# unit: {unit}\ntime,q\n");
+        for k in 0..=200 {
+            let u = ((0.01 * f64::from(k) - 0.2) / 1.5).clamp(0.0, 1.0);
+            let q = 0.5 * u.powi(3) * (10.0 - 15.0 * u + 6.0 * u * u);
+            let q = if unit == "deg" { q.to_degrees() } else { q };
+            writeln!(text, "{:.2},{q:.digits$}", 0.01 * f64::from(k)).unwrap();
+        }
+        let motion = parse(&text);
+        let limits = JointLimits { lower: 0.0, upper: 0.5, ..JointLimits::UNLIMITED };
+        assert_eq!(motion.check_limits(&[limits]), [], "{unit}");
+        // A violation by a ten-thousandth of the range counts.
+        let tight = JointLimits { lower: 5e-5, ..limits };
+        assert_eq!(motion.check_limits(&[tight]).len(), 1);
+    }
 }

@@ -97,7 +97,7 @@ pub(crate) const OF_LOADS: Ranges = &[
 
 /// Usual magnitudes of nonzero numbers that need no robot to compare with, the caveat of others, and
 /// the mistakes that explain them.
-struct Usual {
+pub(crate) struct Usual {
     keys: &'static [&'static str],
     kind: FindingKind,
     range: RangeInclusive<f64>,
@@ -105,7 +105,7 @@ struct Usual {
 }
 
 /// Usual numbers of a robot file.
-const USUAL: [Usual; 6] = [
+const USUAL_OF_ROBOT: &[Usual] = &[
     // One turn: larger angles are in degrees.
     Usual {
         keys: &["rpy", "roll", "free_angle", "sine.zero", "controller_axis.zero"],
@@ -152,6 +152,45 @@ const USUAL: [Usual; 6] = [
         range: 1e-6..=f64::INFINITY,
         factors: &[],
     },
+    // Gas springs and hydraulic accumulators.
+    Usual {
+        keys: &["gas.pressure"],
+        kind: kinds::UNUSUAL.with_unit("Pa"),
+        range: 1e5..=1e8,
+        factors: &[(1e-3, "kPa"), (1e-5, "bar"), (1e-6, "MPa")],
+    },
+    Usual {
+        keys: &["gas.volume"],
+        kind: kinds::UNUSUAL.with_unit("m3"),
+        range: 1e-6..=0.1,
+        factors: &[(1e3, "litres"), (1e6, "cm3")],
+    },
+];
+
+/// Usual numbers of a loads file.
+pub(crate) const USUAL_OF_LOADS: &[Usual] = &[
+    // Impulses of hammers and bumps take 1e-4 to 0.1 s.
+    Usual {
+        keys: &["duration"],
+        kind: kinds::UNUSUAL.with_unit("s"),
+        range: 1e-6..=0.5,
+        factors: &[(1e3, "milliseconds")],
+    },
+    // Large face mills have 100, dental spindles 4e5.
+    Usual {
+        keys: &["spindle_rpm"],
+        kind: kinds::UNUSUAL.with_unit("1/min"),
+        range: 20.0..=5e5,
+        factors: &[(1e-3, "1000/min"), (1.0 / 60.0, "1/s")],
+    },
+    Usual { keys: &["teeth"], kind: kinds::UNUSUAL, range: 1.0..=100.0, factors: &[] },
+    // Arms have no modes above.
+    Usual {
+        keys: &["frequency", "from", "to"],
+        kind: kinds::UNUSUAL.with_unit("Hz"),
+        range: 1e-3..=5000.0,
+        factors: &[(60.0, "1/min"), (1e3, "mHz")],
+    },
 ];
 
 /// Returns the caveats about numbers of a robot file that are possible but not usual.
@@ -160,15 +199,17 @@ const USUAL: [Usual; 6] = [
 pub(crate) fn unusual(text: &str) -> Vec<Finding> {
     let found = RefCell::new(Vec::new());
     let judge = |name: &str, number: f64| {
-        for Usual { kind, range, factors, .. } in
-            USUAL.iter().filter(|usual| number != 0.0 && usual.keys.iter().any(|key| belongs(name, key)))
-        {
-            found.borrow_mut().extend(slip::outside(kind, name, number.abs(), range, factors, 1.0));
-        }
+        found.borrow_mut().extend(judged(name, number, USUAL_OF_ROBOT));
         Ok(number)
     };
     first(text, &judge);
     found.into_inner()
+}
+
+/// Returns the caveats about a number, by the path of its keys.
+pub(crate) fn judged<'a>(name: &'a str, number: f64, usual: &'a [Usual]) -> impl Iterator<Item = Finding> + 'a {
+    let own = usual.iter().filter(move |usual| number != 0.0 && usual.keys.iter().any(|key| belongs(name, key)));
+    own.filter_map(move |usual| slip::outside(&usual.kind, name, number.abs(), &usual.range, usual.factors, 1.0))
 }
 
 /// Returns the first finite number outside its range, with its location and a message. Numbers of

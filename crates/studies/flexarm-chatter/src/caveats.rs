@@ -79,7 +79,7 @@ const DEEPEST: RangeInclusive<f64> = 2e-3..=20.0;
 const DIAMETER: RangeInclusive<f64> = 1e-4..=0.5;
 const FREQUENCY: RangeInclusive<f64> = 20.0..=1e5;
 const STIFFNESS: RangeInclusive<f64> = 1e4..=1e10;
-const DAMPING: RangeInclusive<f64> = 1e-4..=0.3;
+const DAMPING: RangeInclusive<f64> = 1e-3..=0.3;
 /// Radial and axial cutting coefficient over the tangential one.
 const COEFFICIENT: RangeInclusive<f64> = 0.0..=3.0;
 /// Helix and lead angles other than 0 (degrees); cutters for high feed have leads of 10.

@@ -363,6 +363,9 @@ fn range(
         let expected = if logarithmic { "positive numbers for spacing = \"log\"" } else { "finite numbers" };
         return Err(fail(format!("from = {from}, to = {to}: expected {expected}")));
     }
+    if from == to {
+        return Err(fail(format!("from and to are {from}, so that nothing is varied; give different ones")));
+    }
     let steps = match &own.count {
         Some(steps) => count(steps, "count", 1, source)?,
         None => USUAL_STEPS,

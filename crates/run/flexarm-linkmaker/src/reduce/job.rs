@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use flexarm_fem::reduction::Tie;
 use flexarm_fem::{NodeSelector, UnitSystem};
 use flexarm_files::{FileError, Source};
+use flexarm_settings::exact;
 use serde::de::IgnoredAny;
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -298,7 +299,7 @@ pub fn parse_job(text: &str, path: &Path) -> Result<ReduceJob, LinkError> {
         };
         LinkError::from(source.unread(error.span(), &format!("{}{hint}", error.message().trim())))
     };
-    let mut job: ReduceJob = toml::from_str(text).map_err(failed)?;
+    let mut job: ReduceJob = toml::Deserializer::parse(text).and_then(exact).map_err(failed)?;
     let places: Places = toml::from_str(text).map_err(failed)?;
     for (entry, place) in job.interface.iter_mut().zip(places.interface) {
         let span = place.select.or(place.name).map_or(0..0, |value| value.span());

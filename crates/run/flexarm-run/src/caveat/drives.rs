@@ -56,6 +56,8 @@ const SMOOTHING: f64 = 0.1;
 const SAMPLE: RangeInclusive<f64> = 1e-6..=0.05;
 /// Range of the gain of a position loop (1/s).
 const GAIN: RangeInclusive<f64> = 0.1..=1000.0;
+/// Range of the integral over the velocity gain (1/s).
+const INTEGRAL: RangeInclusive<f64> = 0.01..=1000.0;
 /// Range of the torque limit of a servo over the effort limit of its joint.
 const LIMIT: RangeInclusive<f64> = 0.01..=30.0;
 /// Minimum velocity gain over inertia (1/s): a slower speed loop does not follow a motion.
@@ -271,6 +273,14 @@ pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) ->
     let name = || format!("joint {joint:?}");
     let judge = || outside(&kinds::VELOCITY_GAIN, name(), gain, &range, &[(1e-3, "kN m s/rad")], 1.0);
     (inertia > 0.0 && gain != 0.0).then(judge).flatten()
+}
+
+/// Checks the integral over the velocity gain of a servo (1/s).
+pub(crate) fn integral(joint: &str, rate: f64) -> Option<Finding> {
+    let what = format!("the integral over the velocity gain of joint {joint:?}");
+    let factors = &[(1e-3, "kN m/rad or 1/ms"), (1e3, "N mm/rad")];
+    let judge = || outside(&kinds::UNUSUAL.with_unit("1/s"), what, rate, &INTEGRAL, factors, 1.0);
+    (rate > 0.0 && rate.is_finite()).then(judge).flatten()
 }
 
 /// Checks the deflection of a drive's spring, in rotation (rad) and translation (m); `times` scales

@@ -128,3 +128,25 @@ pub(crate) const BALANCER_SIDE: FindingKind = FindingKind::warning(
     "N m",
     "a balancer takes weight off the motor: check on which side of the joint its ends are, and its sense",
 );
+
+/// The arm rests for most of its motion.
+pub(crate) const LONG_REST: FindingKind = FindingKind::note(
+    "long-rest",
+    "{where} rests for {value} s, more than ten times the {yardstick} s in which it moves",
+    "s",
+    "times of holds and dwells are in s",
+);
+/// All joints are slow.
+pub(crate) const SLOW_JOINTS: FindingKind = FindingKind::note(
+    "speed-limit",
+    "{where} turns with at most {value} rad/s, those of arms of this size with more than {yardstick}",
+    "rad/s",
+    "limits of a URDF are in rad and rad/s",
+);
+/// The range of a joint is small.
+pub(crate) const NARROW_RANGE: FindingKind = FindingKind::warning(
+    "joint-range",
+    "{where} has a range of {value} rad, joints of arms have more than {yardstick}",
+    "rad",
+    "limits of a URDF are in rad and rad/s",
+);

@@ -18,8 +18,6 @@ use crate::robot::Robot;
 use crate::robot::mounting::RobotMounting;
 use crate::robot::robot_link::RobotLink;
 
-/// Range of Young's modulus, from polymers to diamond (Pa).
-const YOUNG: RangeInclusive<f64> = 1e8..=1.3e12;
 /// Range of density, from foam to osmium (kg/m³).
 const RHO: RangeInclusive<f64> = 20.0..=22_600.0;
 /// Range of Poisson's ratio of structural materials; rubber has almost 0.5, auxetic foams less than
@@ -148,7 +146,7 @@ pub(crate) fn of_mounting(robot: &Robot) -> Vec<Finding> {
 
 /// Checks elastic constants and density.
 fn material(name: &str, material: &Material) -> impl Iterator<Item = Finding> {
-    let young = outside(&kinds::MODULUS, name, material.E, &YOUNG, slip::MODULUS, 1.0);
+    let young = outside(&kinds::MODULUS, name, material.E, &material.usual_moduli(), slip::MODULUS, 1.0);
     let rho = outside(&kinds::MATERIAL_DENSITY, name, material.rho, &RHO, slip::DENSITY, 1.0);
     let nu = outside(&kinds::POISSON, name, material.nu, &NU, &[(100.0, "per cent")], 1.0);
     young.into_iter().chain(rho).chain(nu)

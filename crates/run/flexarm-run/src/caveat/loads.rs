@@ -1,19 +1,14 @@
-//! Caveats about loads as written: times relative to the run, angles in degrees, impulses, spindles.
+//! Caveats about loads as written: times relative to the run, angles in degrees.
 
 use std::f64::consts::TAU;
-use std::ops::RangeInclusive;
 
-use super::slip::{outside, slip};
+use super::slip::slip;
 use super::{Finding, kinds, parts};
 
 /// Duration of a load relative to that of the run: note, warning.
 const LONG: [f64; 2] = [2.0, 10.0];
 /// Angular rates of sines in degrees are multiples of this (a quarter of a turn).
 const QUARTER: f64 = 90.0;
-/// Duration of an impulse (s); those of hammers and bumps take 1e-4 to 0.1.
-const IMPULSE: RangeInclusive<f64> = 1e-6..=0.5;
-/// Spindle speed (1/min); large face mills have 100, dental spindles 4e5.
-const SPINDLE: RangeInclusive<f64> = 20.0..=5e5;
 
 /// Checks the last time of a table or an impulse (s) against the end of the run.
 pub(crate) fn of_end(last: f64, duration: f64) -> Option<Finding> {
@@ -24,18 +19,6 @@ pub(crate) fn of_end(last: f64, duration: f64) -> Option<Finding> {
         ratio if ratio > LONG[0] => Some(caveat().as_note()),
         _ => None,
     }
-}
-
-/// Checks the duration of an impulse (s).
-pub(crate) fn of_impulse(duration: Option<f64>) -> Option<Finding> {
-    let kind = kinds::UNUSUAL.with_unit("s");
-    outside(&kind, "the duration of an impulse", duration?, &IMPULSE, &[(1e3, "milliseconds")], 1.0)
-}
-
-/// Checks the spindle speed of a milling force (1/min).
-pub(crate) fn of_spindle(rpm: Option<f64>) -> Option<Finding> {
-    let kind = kinds::UNUSUAL.with_unit("1/min");
-    outside(&kind, "the spindle speed of a load", rpm?, &SPINDLE, &[(1e-3, "1000/min"), (1.0 / 60.0, "1/s")], 1.0)
 }
 
 /// Checks the phase of a sine (rad).

@@ -18,6 +18,10 @@ const HASTE: f64 = 10.0;
 const SLOW: f64 = 2e-3;
 /// Minimum plausible travel of a motion (rad).
 const SMALL: f64 = 0.02;
+/// Speed (rad/s or m/s) below which a joint rests.
+const STILL: f64 = 1e-6;
+/// Maximum rest (s), and maximum rest over the time in which the robot moves.
+const REST: (f64, f64) = (100.0, 10.0);
 /// Force relative to the arm's weight, or moment relative to its weight at full length: note,
 /// warning.
 const HEAVY: [f64; 2] = [2.0, 10.0];
@@ -57,12 +61,32 @@ pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> V
         let likely = slip(SLOW / used, &(0.002..=1.0), &[(1e3, "milliseconds")], 1.0);
         caveats.push(kinds::SLOW_MOTION.found(name, used, SLOW).likely(likely));
     }
+    caveats.extend(rests(name, trajectory).filter(|_| !still));
     if travel > 0.0 && travel < SMALL {
         let caveat = kinds::SMALL_MOTION.found(name, travel, SMALL);
         let likely = slip(travel, &(SMALL..=7.0), &[(1.0 / DEGREES, "radians in a file in degrees")], 1.0);
         caveats.push(caveat.likely(likely));
     }
     caveats
+}
+
+/// Compares the time in which a long motion rests with that in which it moves.
+fn rests(name: &str, trajectory: &Trajectory) -> Option<Finding> {
+    const INSTANTS: usize = 20 * TIMES;
+    let duration = trajectory.duration();
+    if duration < REST.0 {
+        return None;
+    }
+    let [mut q, mut v, mut a] = [(); 3].map(|()| vec![0.0; trajectory.joints().len()]);
+    let moves = |k: &usize| {
+        trajectory.sample(duration * *k as f64 / INSTANTS as f64, &mut q, &mut v, &mut a);
+        v.iter().any(|speed| speed.abs() > STILL)
+    };
+    let moves_s = duration * (0..INSTANTS).filter(moves).count() as f64 / INSTANTS as f64;
+    let rest_s = duration - moves_s;
+    let likely = || slip(rest_s, &(0.0..=REST.0), &[(1e3, "milliseconds")], 1.0);
+    let caveat = || kinds::LONG_REST.found(name, rest_s, moves_s).likely(likely());
+    (rest_s > REST.0.max(REST.1 * moves_s)).then(caveat)
 }
 
 /// Checks whether positions beyond their limits would be within them if they were in degrees.

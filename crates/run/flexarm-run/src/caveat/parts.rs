@@ -28,6 +28,12 @@ const POINT_MASS: f64 = 10.0;
 const FAST: (f64, f64) = (30.0, 120.0);
 /// Joint speed that no robot has (rad/s); the fastest SCARA and delta robots have 45.
 const FASTEST: f64 = 50.0;
+/// Speed of the tip (m/s) that the speed limit of a joint allows at most; delta robots have 10.
+const SWEEP: f64 = 25.0;
+/// Speed limit (rad/s) of the fastest joint of an arm that is shorter than a crane (m).
+const SLOWEST: (f64, f64) = (0.1, 10.0);
+/// Minimum range of a joint (rad), unless few joints have less.
+const NARROW: f64 = 0.15;
 /// Maximum effort limit relative to the largest gravity torque.
 const STRONG: f64 = 300.0;
 /// Maximum tip acceleration from an effort limit (m/s²).
@@ -178,28 +184,51 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
     caveats
 }
 
-/// Checks for speeds and ranges that look like degrees.
+/// Checks for speeds and ranges in other units.
 fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Finding> {
     let turning: Vec<&Joint> = mechanism.joints.iter().filter(|j| j.kind.turns()).collect();
-    let fast = turning.iter().filter(|j| j.limits.velocity.is_finite() && j.limits.velocity > FAST.0).map(|joint| {
-        let speed = joint.limits.velocity;
-        let caveat = kinds::SPEED_LIMIT.found(format!("joint {:?}", joint.name), speed, FAST.0);
-        let factors = &[slip::ANGLE[0], (60.0 / std::f64::consts::TAU, "1/min")];
-        let caveat = caveat.likely(slip(speed, &(0.05..=FAST.0), factors, 1.0));
-        // Machines with one or two axes can be modelled on the motor side.
-        let arm = turning.len() > 2;
-        if (arm && speed > FASTEST) || speed * size.beyond(&joint.parent) > FAST.1 { caveat } else { caveat.as_note() }
-    });
+    // Machines with one or two axes can be modelled on the motor side.
+    let arm = turning.len() > 2;
+    let mut caveats = Vec::new();
+    let name = |joint: &Joint| format!("joint {:?}", joint.name);
+    for joint in turning.iter().filter(|joint| joint.limits.velocity.is_finite()) {
+        let (speed, reach) = (joint.limits.velocity, size.beyond(&joint.parent));
+        let most = if arm { FAST.0.min(SWEEP / reach) } else { FAST.0 };
+        let caveat = (speed > most).then(|| kinds::SPEED_LIMIT.found(name(joint), speed, most));
+        let [degrees, turns] = [slip::ANGLE[0], (60.0 / TURN, "1/min")];
+        // In degrees a limit is at least 30 per second.
+        let likely = match slip(speed, &(0.5..=most), &[degrees], 1.0) {
+            none if none.is_empty() => slip(speed, &(0.05..=most), &[turns, degrees], 1.0),
+            found => found,
+        };
+        let caveat = caveat.map(|caveat| caveat.likely(likely));
+        let surely = if arm { speed > FASTEST || speed * reach > SWEEP } else { speed * reach > FAST.1 };
+        caveats.extend(caveat.map(|caveat| if surely { caveat } else { caveat.as_note() }));
+    }
+    let speeds = turning.iter().map(|j| j.limits.velocity).filter(|speed| *speed > 0.0);
+    let fastest = speeds.fold(0.0f64, f64::max);
+    if arm && fastest > 0.0 && fastest < SLOWEST.0 && size.extent < SLOWEST.1 {
+        let caveat = kinds::SLOW_JOINTS.found("the fastest joint", fastest, SLOWEST.0);
+        caveats.push(caveat.likely(slip(fastest, &(SLOWEST.0..=FAST.0), TWICE, 1.0)));
+    }
     let ends = |j: &Joint| j.limits.lower.abs().max(j.limits.upper.abs());
     let wide: Vec<_> = turning.iter().filter(|j| ends(j).is_finite() && ends(j) > 2.0 * TURN).collect();
-    let most = 2 * wide.len() > turning.len();
-    let ranges = wide.iter().map(|joint| {
-        let caveat = kinds::JOINT_RANGE.found(format!("joint {:?}", joint.name), ends(joint), 2.0 * TURN);
-        let caveat = caveat.likely(slip(ends(joint), &(0.0..=2.0 * TURN), &slip::ANGLE[..1], 1.0));
-        if most { caveat } else { caveat.as_note() }
-    });
-    fast.chain(ranges).collect()
+    let width = |j: &Joint| j.limits.upper - j.limits.lower;
+    let narrow: Vec<_> = turning.iter().filter(|j| arm && width(j) > 0.0 && width(j) < NARROW).collect();
+    let severity = |caveat: Finding, of: usize| if 2 * of > turning.len() { caveat } else { caveat.as_note() };
+    caveats.extend(wide.iter().map(|joint| {
+        let caveat = kinds::JOINT_RANGE.found(name(joint), ends(joint), 2.0 * TURN);
+        severity(caveat.likely(slip(ends(joint), &(0.0..=2.0 * TURN), &slip::ANGLE[..1], 1.0)), wide.len())
+    }));
+    caveats.extend(narrow.iter().map(|joint| {
+        let caveat = kinds::NARROW_RANGE.found(name(joint), width(joint), NARROW);
+        severity(caveat.likely(slip(width(joint), &(NARROW..=2.0 * TURN), TWICE, 1.0)), narrow.len())
+    }));
+    caveats
 }
+
+/// Radians that were converted as degrees.
+const TWICE: &[slip::Factor] = &[(1.0 / slip::DEGREES, "converted to radians twice")];
 
 /// Gravity torques below this fraction of the arm's weight times its reach count as zero.
 const NO_WEIGHT: f64 = 1e-4;

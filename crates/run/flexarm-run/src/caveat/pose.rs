@@ -2,7 +2,7 @@
 
 use flexarm_stepping::Plant;
 
-use super::drives::{give, speed_loop};
+use super::drives::{give, integral, speed_loop};
 use super::{Finding, kinds};
 use crate::arm::{Arm, Owner};
 
@@ -92,8 +92,10 @@ impl ArmAtRest<'_> {
         let name = |k: usize| self.plant.model.coordinates()[k].joint.as_str();
         let loops = servo.axes.iter().zip(quick);
         loops
-            .filter_map(|(axis, inertia)| {
-                speed_loop(name(axis.coordinate), axis.velocity_gain, servo.sample_s, inertia)
+            .flat_map(|(axis, inertia)| {
+                let joint = name(axis.coordinate);
+                let speed = speed_loop(joint, axis.velocity_gain, servo.sample_s, inertia);
+                speed.into_iter().chain(integral(joint, axis.integral_gain / axis.velocity_gain))
             })
             .collect()
     }

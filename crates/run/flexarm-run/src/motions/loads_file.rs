@@ -23,7 +23,7 @@ use crate::error::Error;
 use crate::motions::applied_load::AppliedLoad;
 use crate::motions::load_jumps::jumps_of;
 use crate::motions::payload::PayloadChange;
-use crate::ranges::OF_LOADS;
+use crate::ranges::{OF_LOADS, USUAL_OF_LOADS, judged};
 use crate::robot::toml_file::parsed;
 
 /// Loads file as written.
@@ -199,13 +199,21 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
 }
 
 /// Caveats about angles that look like degrees (the phase of a sine, arguments of sin and cos in
-/// expressions), impulses and spindle speeds.
+/// expressions), and about unusual numbers.
 fn findings(e: &LoadEntry) -> Vec<Finding> {
     let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
-    let number = |value: &Option<Spanned<f64>>| value.as_ref().map(|value| *value.get_ref());
-    let [pulse, spindle] = [&e.duration, &e.spindle_rpm].map(number);
-    let laws = caveat::loads::of_impulse(pulse).into_iter().chain(caveat::loads::of_spindle(spindle));
-    caveat::loads::of_phase(e.phase).into_iter().chain(laws).chain(doubtful).collect()
+    let numbers = [
+        ("duration", &e.duration),
+        ("spindle_rpm", &e.spindle_rpm),
+        ("frequency", &e.frequency),
+        ("from", &e.from),
+        ("to", &e.to),
+    ];
+    let numbers = numbers.into_iter().filter_map(|(key, value)| Some((key, *value.as_ref()?.get_ref())));
+    let numbers = numbers.chain(e.teeth.map(|teeth| ("teeth", f64::from(teeth))));
+    let unusual =
+        numbers.flat_map(|(key, number)| judged(&format!("load.{key}"), number, USUAL_OF_LOADS).collect::<Vec<_>>());
+    caveat::loads::of_phase(e.phase).into_iter().chain(unusual).chain(doubtful).collect()
 }
 
 /// The sines and cosines in all expressions of a load; see [`sines`].

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use flexarm_fem::{BeamLink, Material, ReducedLink, Section, UnitSystem};
+use flexarm_fem::{BeamLink, Material, ReducedLink, Section};
 use flexarm_files::{Source, TextFileError as RobotFileError, named_file};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
@@ -374,10 +374,6 @@ fn beam_link(
     let beam = entry.get_ref();
     let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
     let (section, material): (Section, Material) = beam_section(beam).map_err(|error| fail(error.to_string()))?;
-    if beam.material.is_some() {
-        let of_material = material.warnings(&UnitSystem::SI).into_iter();
-        warnings.extend(of_material.map(|warning| format!("link {name:?}: {warning}")));
-    }
     let theory = beam.theory().map_err(|error| fail(error.to_string()))?;
     let [from, to] = beam.ends.map_or([Vector3::zeros(), X_LB.translation.vector], |ends| ends.map(Vector3::from));
     let axis = to - from;

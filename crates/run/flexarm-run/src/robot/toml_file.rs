@@ -2,6 +2,7 @@
 //! location.
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
+use flexarm_settings::exact;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 
@@ -23,7 +24,7 @@ pub fn parsed<T: DeserializeOwned>(
     ranges: Ranges,
     format: impl Fn(&T) -> &Spanned<i64>,
 ) -> Result<T, RobotFileError> {
-    let file: T = toml::from_str(text).map_err(|error| {
+    let file: T = toml::Deserializer::parse(text).and_then(exact).map_err(|error| {
         let hint = match error.message().contains("missing field `format`") {
             true => ": add format = 1 as the first line",
             false if error.message().contains("missing field `kind`") => {

@@ -9,7 +9,7 @@ use flexarm_kinematics::{Data, NullSpaceRule, Pose, forward_kinematics};
 use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
 use flexarm_path::{ControllerAxis, PathOptions, ProgramArm, check_axes, check_rate};
 use flexarm_programs::{GCodeOptions, ReadOptions, Rotary};
-use flexarm_settings::Place;
+use flexarm_settings::{Place, exact};
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Quaternion, Rotation3, Translation3, UnitQuaternion, Vector3};
 use toml::Spanned;
@@ -60,7 +60,7 @@ pub(crate) fn read_path_file(
     cell: &Cell<'_>,
 ) -> Result<(flexarm_trajectory::Trajectory, ToolPath), Error> {
     let source = Source::new(path, text, "path");
-    let file: PathFile = toml::from_str(text).map_err(|error| {
+    let file: PathFile = toml::Deserializer::parse(text).and_then(exact).map_err(|error| {
         let message = format!("{}; docs/motions.md has all keys of path files", error.message());
         source.unread(error.span(), &message)
     })?;

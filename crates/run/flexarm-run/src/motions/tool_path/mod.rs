@@ -17,7 +17,7 @@ use flexarm_path::program::{Move, Program, Speed};
 use flexarm_path::{
     ControllerAxis, JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
 };
-use flexarm_trajectory::Trajectory;
+use flexarm_trajectory::{MotionLimits, Trajectory};
 use nalgebra::DVector;
 
 use crate::caveat::slip::{self, Factor, outside};
@@ -73,11 +73,13 @@ pub struct Assumed {
     /// Link on which tools are assumed to be mounted; irrelevant if a path has no tool of its own.
     pub(crate) flange: Option<String>,
     pub(crate) accelerations: Option<String>,
+    /// A limit that does not suit the others.
+    pub(crate) odd: Option<String>,
 }
 
 impl Assumed {
     pub(crate) fn warnings(self) -> Vec<String> {
-        self.flange.into_iter().chain(self.accelerations).collect()
+        self.flange.into_iter().chain(self.accelerations).chain(self.odd).collect()
     }
 }
 
@@ -165,6 +167,11 @@ impl<'a> Cell<'a> {
                 JointBounds { velocity, acceleration, torque, jerk }
             })
             .collect();
+        let odd = self.model.coordinates().iter().zip(&bounds).find_map(|(c, of): (_, &JointBounds)| {
+            let jerk = of.jerk.unwrap_or(f64::INFINITY);
+            let limits = MotionLimits { velocity: of.velocity, acceleration: of.acceleration, jerk };
+            Some(limits.odd(&c.joint, c.limits.velocity)?.to_string())
+        });
         let accelerations = assumed.then(|| {
             format!(
                 "accelerations of the joints are not known: each is taken to reach its top speed in {TO_TOP_SPEED} s ([limits] of a \
@@ -176,7 +183,7 @@ impl<'a> Cell<'a> {
         let controller = Vec::new();
         let arm =
             ProgramArm { model: self.model, flange, X_FT, X_MW, axes, controller, bounds, rest, starts_at_rest: false };
-        (arm, Assumed { flange: flange_note, accelerations })
+        (arm, Assumed { flange: flange_note, accelerations, odd })
     }
 }
 
