@@ -59,7 +59,8 @@ impl NumberTable {
             let message = match name {
                 name if name.is_empty() => format!("column {} of the header has no name", k + 1),
                 name if names[..k].contains(name) => {
-                    format!("the header names {name:?} twice: rename or remove one of the columns")
+                    let first = names[..k].iter().position(|other| other == name).unwrap_or(k) + 1;
+                    format!("the header names {name:?} twice, in columns {first} and {}: rename or remove one", k + 1)
                 }
                 name if name.parse::<f64>().is_ok() => {
                     format!("the first row has the number {name} where a name was expected: add a header")

@@ -22,12 +22,12 @@
 //!
 //! let spring = ("spring".to_owned(), Matrix6::identity() * 1e5, Damping::Modal(0.03));
 //! let plant = Plant::new(Arc::new(Model::new(&beam)?), vec![spring], Arc::new(Held(vec![])))?;
-//! let mut seen = Observation::new(&plant);
+//! let mut observed = Observation::new(&plant);
 //! let kind = StepperKind::GeneralizedAlpha(AlphaSettings::default());
 //! let mut stepper = new_stepper(kind, plant, 1e-3, Start::Equilibrium)?;
 //! stepper.step()?;
-//! stepper.observe(&mut seen);
-//! assert!((seen.q[2] + 10.0 * 9.81 / 1e5).abs() < 1e-6); // sag = m g / k
+//! stepper.observe(&mut observed);
+//! assert!((observed.q[2] + 10.0 * 9.81 / 1e5).abs() < 1e-6); // sag = m g / k
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 #![allow(non_snake_case, reason = "monogram notation: X_WB, K_S, C_S, M; see docs/references.md")]

@@ -404,9 +404,9 @@ mod bad_loads_files {
         for (text, words) in [
             ("t,fx\n0,1\n1,1\n", &["header", "expected time"][..]),
             ("time,fx,fw\n0,1,1\n1,1,1\n", &["header", "fw"]),
-            ("time,fx\n0,1\n1,one\n", &["loads.csv:3:3", "column \"fx\"", "\"one\""]),
-            ("time,fx\n0,1\n1\n", &["loads.csv:3:1", "expected 2 cells"]),
-            ("time,fx\n0,1\n0,2\n", &["loads.csv:3:1", "does not rise"]),
+            ("time,fx\n0,1\n1,one\n", &["force.csv:3:3", "column \"fx\"", "\"one\""]),
+            ("time,fx\n0,1\n1\n", &["force.csv:3:1", "expected 2 cells"]),
+            ("time,fx\n0,1\n0,2\n", &["force.csv:3:1", "does not rise"]),
             ("time,fx\n0,1\n", &["at least two rows"]),
         ] {
             place.write("force.csv", text);

@@ -24,7 +24,7 @@ fn refused_at_mark(place: &Place, arguments: &[&str], file: &str, text: &str) {
 fn an_error_in_line_k_of_a_robot_or_link_is_reported_as_file_colon_k() {
     let place = Place::new();
     let robot = ["inspect", "robot.toml"];
-    refused_at_mark(&place, &robot, "beam.urdf", &with(URDF, "<axis", "§<aksis"));
+    refused_at_mark(&place, &robot, "beam.urdf", &with(URDF, "<mass value=\"1.728\"/>", "§<mass value=\"heavy\"/>"));
     place.write("beam.urdf", URDF);
     refused_at_mark(&place, &robot, "robot.toml", &with(ROBOT, "link =", "§lnik ="));
     place.write("robot.toml", flex::robot());
@@ -51,18 +51,18 @@ fn an_error_in_line_k_of_a_robot_or_link_is_reported_as_file_colon_k() {
 fn an_error_in_line_k_of_a_motion_is_reported_as_file_colon_k() {
     let place = Place::new();
     let point = "  - positions: [0.0]\n    time_from_start: ";
-    let path = "format = 1\n[path]\nunit = \"rad, m\"\n";
+    let path = "format = 1\n[path]\nlengths = \"m\"\nangles = \"rad\"\n";
     for (file, text) in [
-        ("moves.toml", "format = 1\nunit = \"rad\"\njoints = [\"joint\"]\nstart = [0.0]\n[[move]]\n§to = [1.0, 2.0]\n"),
-        ("table.csv", "time,joint\n0,0\n§1,one\n"),
-        ("table.txt", "t[s]\tjoint[rad]\n0\t0\n§0\t1\n"),
-        ("plan.yaml", &format!("joint_names: [joint]\npoints:\n{point}0.0\n{point}§soon\n")),
-        ("broken.yaml", "joint_names: [joint]\npoints:\n§  - }\n"),
-        ("plan.json", "{\"joint_names\": [\"joint\"],\n§\"points\": [{\"positions\": [0], \"time_from_start\": }]}"),
-        ("path.toml", &format!("{path}[[move]]\njoints = [0.0]\n§[[move]]\nlien = [0.0]\n")),
+        ("moves.toml", "format = 1\nunit = \"rad\"\njoints = [\"swing\"]\nstart = [0.0]\n[[move]]\n§to = [1.0, 2.0]\n"),
+        ("table.csv", "time,swing\n0,0\n§1,one\n"),
+        ("table.txt", "t[s]\tswing[rad]\n0\t0\n§0\t1\n"),
+        ("plan.yaml", &format!("joint_names: [swing]\npoints:\n{point}0.0\n{point}§soon\n")),
+        ("broken.yaml", "joint_names: [swing]\npoints:\n§  - }\n"),
+        ("plan.json", "{\"joint_names\": [\"swing\"],\n§\"points\": [{\"positions\": [0], \"time_from_start\": }]}"),
+        ("path.toml", &format!("{path}[[move]]\njoints = [0.0]\n[[move]]\n§lien = [0.0]\n")),
         (
             "reach.toml",
-            &format!("{path}[[move]]\njoints = [0.0]\n§[[move]]\njoints = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]\n"),
+            &format!("{path}[[move]]\njoints = [0.0]\n[[move]]\n§joints = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]\n"),
         ),
         ("square.src", "DEF square()\nPTP {A1 0}\n§PTP {A1 0,\nEND\n"),
         ("square.mod", "MODULE m\nPROC main()\n§MoveJ nowhere, v100, fine, tool0;\nENDPROC\nENDMODULE\n"),
@@ -70,6 +70,16 @@ fn an_error_in_line_k_of_a_motion_is_reported_as_file_colon_k() {
         ("square.nc", "G21 F100\nG0 X0 Y0 Z0\n§G1 X1 Y(\n"),
     ] {
         refused_at_mark(&place, &["compare", "robot.toml", file, "--no-files"], file, text);
+    }
+    // Programs that the arm cannot follow.
+    let home = "PTP {A1 0,A2 -60,A3 60,A4 0,A5 20,A6 0}";
+    let far = "line = [9.5, 0.0, 0.1]\nrpy = [0.0, 0.0, 0.0]\n";
+    for (file, text) in [
+        ("far.src", &format!("DEF a()\n{home}\n§LIN {{X 9000,Y 0,Z 100,A 0,B 0,C 0}}\nEND\n")),
+        ("far.toml", &format!("{path}[[move]]\njoints = [0, -0.5, 0.5, 0, 0.3, 0]\n§[[move]]\n{far}")),
+        ("start.toml", &format!("{path}§[[move]]\n{far}")),
+    ] {
+        refused_at_mark(&place, &["motion", file, "kr210"], file, text);
     }
 }
 
@@ -92,7 +102,7 @@ fn an_error_in_line_k_of_loads_and_of_a_table_is_reported_as_file_colon_k() {
     }
     let map = ["map", "robot.toml", "--poses"];
     for (file, text) in [
-        ("poses.csv", "joint\n0.0\n§9e9\n"),
+        ("poses.csv", "swing\n0.0\n§9e9\n"),
         ("names.csv", "# rad\n§jonit\n0.0\n"),
         ("poses.toml", "format = 1\nposes = [\n  [0.0],\n§  [0.0, 0.0],\n]\n"),
     ] {
@@ -119,7 +129,6 @@ fn an_error_in_line_k_of_a_file_of_a_finite_element_program_is_reported_as_file_
     }
     for (file, text) in [
         ("bar.mtx", "%%MatrixMarket matrix coordinate real symmetric\n2 2 2\n1 1 1.0\n§2 2 one\n"),
-        ("bar.csv", "1.0,0.0\n§0.0,one\n"),
         (
             "bar.pch",
             "DMIG    KAAX           0       6       1       0\n§DMIG*   KAAX                           one               1\n",

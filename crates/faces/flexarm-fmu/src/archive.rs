@@ -339,7 +339,7 @@ fn zipped(entries: &NamedFiles) -> std::io::Result<Vec<u8>> {
 /// * `token`: that of the importer, from the description.
 ///
 /// # Errors
-/// [`FmuError::File`] for resources that are missing or damaged, [`FmuError::Token`],
+/// [`FmuError::File`] for resources that are missing, damaged or of another FMU,
 /// [`FmuError::Robot`].
 pub fn open_resources(folder: &Path, token: &str) -> Result<FmuModel, FmuError> {
     let path = folder.join(SETTINGS);
@@ -350,7 +350,8 @@ pub fn open_resources(folder: &Path, token: &str) -> Result<FmuModel, FmuError> 
         return Err(damaged(format!("format = {}: this library reads format 1", filed.format)));
     }
     if filed.token != token {
-        return Err(FmuError::Token { given: token.to_owned(), own: filed.token });
+        let what = format!("the token {token:?} is not that of this FMU, {:?}", filed.token);
+        return Err(damaged(format!("{what}: its description and its resources do not belong together")));
     }
     let stepper = StepperEntry::named(&filed.stepper);
     let stepper = stepper.ok_or_else(|| damaged(format!("stepper = {:?}: there is no such stepper", filed.stepper)))?;

@@ -2,8 +2,6 @@
 
 use std::path::PathBuf;
 
-use crate::variables::Kind;
-
 /// Why a plant refuses.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -14,23 +12,19 @@ pub enum FmuError {
     /// Files exist or cannot be written.
     #[error(transparent)]
     Written(#[from] flexarm::errors::FileError),
-    /// There is no variable with this reference.
-    #[error("there is no variable with the reference {0}")]
-    Reference(usize),
-    /// A variable has another type.
-    #[error("{name} is a {}", match kind { Kind::Real => "number", Kind::Boolean => "truth value" })]
-    Kind {
+    /// A variable does not exist, has another type, or cannot be set now.
+    #[error("{0}")]
+    Variable(String),
+    /// A number is not finite, or a truth value is another number.
+    #[error("{name} = {found}: expected {expected}")]
+    Value {
         /// Name of the variable.
         name: String,
-        /// Its type.
-        kind: Kind,
+        /// Value.
+        found: f64,
+        /// Values expected.
+        expected: &'static str,
     },
-    /// A variable is computed.
-    #[error("{0} is computed and cannot be set; parameters and inputs can")]
-    NotSettable(String),
-    /// A parameter is set after the start.
-    #[error("{0}: the arm has started; set parameters before, or reset the arm")]
-    Started(String),
     /// The arm is no differential equation in its coordinates.
     #[error(
         "this arm has no equations for model exchange: it is rigid, has hysteresis, or its stepper is spook; use co-simulation"
@@ -39,44 +33,11 @@ pub enum FmuError {
     /// The plant is not started.
     #[error("the arm has not started: exit the initialisation first")]
     NotStarted,
-    /// A value is not finite.
-    #[error("{name} = {found}: expected a finite number")]
-    NotFinite {
-        /// Name of the variable.
-        name: String,
-        /// Value.
-        found: f64,
-    },
-    /// A truth value is another number.
-    #[error("{name} = {found}: expected 0 or 1")]
-    TruthValue {
-        /// Name of the variable.
-        name: String,
-        /// Value.
-        found: f64,
-    },
-    /// The first step, which sets the step of the solver, is far shorter than the parameter `step`.
-    #[error(
-        "the first communication step is {length_s} s, less than a thousandth of the solver's step of {step_s} s: set the parameter step to what such steps need"
-    )]
-    Short {
-        /// Communication step (s).
-        length_s: f64,
-        /// Parameter `step` (s).
-        step_s: f64,
-    },
-    /// A step has no positive length.
-    #[error("the communication step is {0} s: expected a positive length")]
-    Length(f64),
-    /// The caller is at another time.
-    #[error("the communication step starts at {given_s} s, the arm is at {own_s} s")]
-    Time {
-        /// Time of the caller (s).
-        given_s: f64,
-        /// Time of the plant (s).
-        own_s: f64,
-    },
-    /// A file cannot be read or written.
+    /// A communication step has no positive length, is far too short for the solver, or starts at
+    /// another time than that of the plant, which is unchanged.
+    #[error("{0}")]
+    Step(String),
+    /// A file cannot be read or written, or does not belong to the FMU.
     #[error("{}: {what}", path.display())]
     File {
         /// The file.
@@ -92,14 +53,21 @@ pub enum FmuError {
         /// When it was called.
         phase: &'static str,
     },
-    /// The token of the importer is not that of the FMU.
-    #[error(
-        "the token {given:?} is not that of this FMU, {own:?}: its description and its resources do not belong together"
-    )]
-    Token {
-        /// Given token.
-        given: String,
-        /// Token in the resources.
-        own: String,
-    },
+}
+
+impl FmuError {
+    /// Error about a number that is not finite.
+    pub(crate) fn not_finite(name: &str, found: f64) -> Self {
+        Self::Value { name: name.to_owned(), found, expected: "a finite number" }
+    }
+
+    /// Error about a variable that is computed.
+    pub(crate) fn not_settable(name: &str) -> Self {
+        Self::Variable(format!("{name} is computed and cannot be set; parameters and inputs can"))
+    }
+
+    /// Error about a parameter that is set after the start.
+    pub(crate) fn started(name: &str) -> Self {
+        Self::Variable(format!("{name}: the arm has started; set parameters before, or reset the arm"))
+    }
 }

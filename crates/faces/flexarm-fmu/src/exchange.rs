@@ -47,13 +47,13 @@ impl FmuModel {
     /// Sets the time (s).
     ///
     /// # Errors
-    /// [`FmuError::NotFinite`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
+    /// [`FmuError::Value`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
     pub fn set_time(&mut self, to_s: f64) -> Result<(), FmuError> {
         let Some(Running::Equations { time_s, is_stale, .. }) = &mut self.running else {
             return Err(FmuError::NotStarted);
         };
         if !to_s.is_finite() {
-            return Err(FmuError::NotFinite { name: "time".into(), found: to_s });
+            return Err(FmuError::not_finite("time", to_s));
         }
         (*time_s, *is_stale) = (to_s, true);
         Ok(())
@@ -67,14 +67,14 @@ impl FmuModel {
     /// Sets the continuous states.
     ///
     /// # Errors
-    /// [`FmuError::NotFinite`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
+    /// [`FmuError::Value`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
     pub fn set_states(&mut self, states: &[f64]) -> Result<(), FmuError> {
         if !matches!(self.running, Some(Running::Equations { .. })) {
             return Err(FmuError::NotStarted);
         }
         for (&reference, &found) in self.states.states.iter().zip(states) {
             if !found.is_finite() {
-                return Err(FmuError::NotFinite { name: self.variables[reference].name.clone(), found });
+                return Err(FmuError::not_finite(&self.variables[reference].name, found));
             }
         }
         for (&reference, &value) in self.states.states.iter().zip(states) {
@@ -124,7 +124,7 @@ impl FmuModel {
     /// `knowns` (inputs, states), by central differences of fourth order.
     ///
     /// # Errors
-    /// [`FmuError::Reference`], [`FmuError::Kind`], [`FmuError::NotSettable`] for a known that
+    /// [`FmuError::Variable`], also for a known that
     /// is neither input nor state; as [`FmuModel::evaluate`].
     pub fn directional_derivative(
         &mut self,
@@ -139,7 +139,7 @@ impl FmuModel {
         for &reference in knowns {
             let known = self.variable(reference, Kind::Real)?;
             if known.causality != Causality::Input && !self.states.states.contains(&reference) {
-                return Err(FmuError::NotSettable(known.name.clone()));
+                return Err(FmuError::not_settable(&known.name));
             }
         }
         let values = self.values.clone();

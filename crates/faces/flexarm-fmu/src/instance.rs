@@ -192,7 +192,7 @@ impl Instance {
         self.expect("a step", &[Phase::Step])?;
         let done = self.model.step(from_s, length_s);
         // A wrong call leaves the arm as it was.
-        let kept = matches!(done, Ok(()) | Err(FmuError::Time { .. } | FmuError::Length(_) | FmuError::Short { .. }));
+        let kept = matches!(done, Ok(()) | Err(FmuError::Step(_)));
         if !kept && !matches!(&done, Err(FmuError::Robot(flexarm::Error::Value(_)))) {
             self.phase = Phase::Failed;
         }

@@ -159,9 +159,16 @@ impl FmuModel {
     }
 
     pub(crate) fn variable(&self, reference: usize, kind: Kind) -> Result<&Variable, FmuError> {
-        let variable = self.variables.get(reference).ok_or(FmuError::Reference(reference))?;
+        let variable = self
+            .variables
+            .get(reference)
+            .ok_or_else(|| FmuError::Variable(format!("there is no variable with the reference {reference}")))?;
         if variable.kind != kind {
-            return Err(FmuError::Kind { name: variable.name.clone(), kind: variable.kind });
+            let kind = match variable.kind {
+                Kind::Real => "number",
+                Kind::Boolean => "truth value",
+            };
+            return Err(FmuError::Variable(format!("{} is a {kind}", variable.name)));
         }
         Ok(variable)
     }
@@ -169,7 +176,7 @@ impl FmuModel {
     /// Returns a number.
     ///
     /// # Errors
-    /// [`FmuError::Reference`], [`FmuError::Kind`].
+    /// [`FmuError::Variable`].
     pub fn get(&self, reference: usize) -> Result<f64, FmuError> {
         self.variable(reference, Kind::Real)?;
         Ok(self.values[reference])
@@ -187,8 +194,7 @@ impl FmuModel {
     /// Sets a number: a parameter before the start, an input at any time.
     ///
     /// # Errors
-    /// [`FmuError::Reference`], [`FmuError::Kind`], [`FmuError::NotSettable`],
-    /// [`FmuError::NotFinite`].
+    /// [`FmuError::Variable`], [`FmuError::Value`].
     pub fn set(&mut self, reference: usize, value: f64) -> Result<(), FmuError> {
         self.set_value(reference, Kind::Real, value)
     }
@@ -203,17 +209,17 @@ impl FmuModel {
 
     fn set_value(&mut self, reference: usize, kind: Kind, value: f64) -> Result<(), FmuError> {
         let variable = self.variable(reference, kind)?;
-        let name = || variable.name.clone();
+        let name = &variable.name;
         match variable.causality {
             Causality::Input => {}
             Causality::Parameter if !self.is_started() => {}
-            Causality::Parameter => return Err(FmuError::Started(name())),
+            Causality::Parameter => return Err(FmuError::started(name)),
             Causality::Output | Causality::Independent | Causality::Local => {
-                return Err(FmuError::NotSettable(name()));
+                return Err(FmuError::not_settable(name));
             }
         }
         if !value.is_finite() {
-            return Err(FmuError::NotFinite { name: name(), found: value });
+            return Err(FmuError::not_finite(name, value));
         }
         self.values[reference] = value;
         self.make_stale();
@@ -252,7 +258,7 @@ impl FmuModel {
     /// Starts the arm at rest at the target positions, at time `begin_s` (s) of the caller.
     ///
     /// # Errors
-    /// [`FmuError::Robot`] for parameters without sense, [`FmuError::Started`].
+    /// [`FmuError::Robot`] for parameters without sense, [`FmuError::Variable`] after the start.
     pub fn start(&mut self, begin_s: f64) -> Result<(), FmuError> {
         self.check_start(begin_s)?;
         (self.begin_s, self.steps) = (begin_s, 0);
@@ -264,11 +270,11 @@ impl FmuModel {
     /// Checks that the arm may start at a time (s).
     pub(crate) fn check_start(&self, begin_s: f64) -> Result<(), FmuError> {
         if self.is_started() {
-            return Err(FmuError::Started("start".into()));
+            return Err(FmuError::started("start"));
         }
         match begin_s.is_finite() {
             true => Ok(()),
-            false => Err(FmuError::NotFinite { name: "start time".into(), found: begin_s }),
+            false => Err(FmuError::not_finite("start time", begin_s)),
         }
     }
 
@@ -337,8 +343,8 @@ impl FmuModel {
     /// `step`.
     ///
     /// # Errors
-    /// [`FmuError::NotStarted`]; [`FmuError::Time`] if `from_s` is not the time of the plant;
-    /// [`FmuError::Short`] for a first step below a thousandth of the parameter `step`;
+    /// [`FmuError::NotStarted`]; [`FmuError::Step`] if `from_s` is not the time of the plant, and
+    /// for a first step below a thousandth of the parameter `step`;
     /// [`FmuError::Robot`] for a length that is no multiple of the solver step, and for a step
     /// that fails.
     pub fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), FmuError> {
@@ -351,17 +357,22 @@ impl FmuModel {
             Some(Running::Steps(_)) => {}
         }
         if !(length_s.is_finite() && length_s > 0.0) {
-            return Err(FmuError::Length(length_s));
+            let what = format!("the communication step is {length_s} s: expected a positive length");
+            return Err(FmuError::Step(what));
         }
         let is_same = (from_s - own_s).abs() <= SAME_TIME * length_s;
         if !is_same {
-            return Err(FmuError::Time { given_s: from_s, own_s });
+            let what = format!("the communication step starts at {from_s} s, the arm is at {own_s} s");
+            return Err(FmuError::Step(what));
         }
         if self.steps == 0 {
             let step_s = self.parameter(Meaning::Step, 0.0);
             let count = length_s / step_s;
             if count < SHORTEST {
-                return Err(FmuError::Short { length_s, step_s });
+                return Err(FmuError::Step(format!(
+                    "the first communication step is {length_s} s, less than a thousandth of the solver's step of \
+                     {step_s} s: set the parameter step to what such steps need"
+                )));
             }
             if (count - count.round()).abs() > WHOLE || count < 0.5 {
                 let live = self.begun(Some(length_s / count.ceil().max(1.0)))?;

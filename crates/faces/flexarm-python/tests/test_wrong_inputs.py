@@ -110,6 +110,14 @@ def test_errors_are_by_cause(tmp_path: Path) -> None:
         flexarm.load(tmp_path / "robot.txt")
 
 
+def test_the_content_of_a_wrong_table_is_a_file_error(arm: flexarm.Arm, tmp_path: Path) -> None:
+    loads = tmp_path / "loads.toml"
+    loads.write_text('format = 1\n[[load]]\nkind = "table"\nfile = "force.csv"\n')
+    (tmp_path / "force.csv").write_text("time,fx\n0,1\n1,one\n")
+    with pytest.raises(flexarm.FileError, match=r"force\.csv:3:3"):
+        arm.simulate(loads=loads)
+
+
 def test_files_are_not_overwritten(arm: flexarm.Arm, tmp_path: Path) -> None:
     run = arm.simulate(step=4e-3, output=tmp_path, formats=["csv"])
     before = Path(run.files["csv"]).read_bytes()

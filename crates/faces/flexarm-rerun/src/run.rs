@@ -143,8 +143,8 @@ impl DrawnRobots {
             let root = root.join(&path([name]));
             // One frame of each name in a recording.
             let frames = role.is_first().then_some(prefix);
-            let look = RobotAppearance { root, frames, paint, bends, tolerance_m, every_ns, quantum_m };
-            RobotTracks::new(header, look, stream)
+            let appearance = RobotAppearance { root, frames, paint, bends, tolerance_m, every_ns, quantum_m };
+            RobotTracks::new(header, appearance, stream)
         };
         let with_magnified = has_magnified(header);
         let flexible = match alone || !with_magnified {

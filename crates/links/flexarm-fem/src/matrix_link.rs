@@ -65,7 +65,7 @@ pub struct MatrixReduction {
     /// Frequencies of the two rigid parts with their joint, A clamped, Hz.
     pub lumped_frequencies_hz: Vec<f64>,
     /// Warnings about accepted but suspicious input.
-    pub findings: Vec<Finding>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Reduces a full model to some of its own DoF, six per interface, in order.
@@ -120,9 +120,9 @@ pub fn link_from_superelement(
     let loose = FemError::Missing { what: "stiffness of an interface or a mode", help: "it holds nothing" };
     let K12 = stiffness12(&element).ok_or(loose)?;
     let frames = LinkFrames::new(element.interfaces[0].X_LI, element.interfaces[1].X_LI);
-    let mut findings = Vec::new();
+    let mut caveats = Vec::new();
     let (p, said) = split_point(&frames, &K12, plan.split, &|_| true);
-    findings.extend(said.map(|said| Finding::warning("split", "", said, "")));
+    caveats.extend(said.map(|said| Finding::warning("split", "", said, "")));
     let frames = frames.with_split(Pose::translation(p.x, p.y, p.z));
 
     let whole = match &plan.masses {
@@ -138,7 +138,7 @@ pub fn link_from_superelement(
     let parts = match &plan.masses {
         PartMasses::Given(parts) => parts.clone(),
         _ => {
-            findings.push(Finding::warning(
+            caveats.push(Finding::warning(
                 "halves",
                 "",
                 "the masses of the two parts are the halves of a uniform bar with the mass, centre of mass and \
@@ -152,13 +152,13 @@ pub fn link_from_superelement(
     let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
     if has_mass && held_frequencies_hz.is_empty() {
         let said = "the mass matrix is not positive definite: no frequencies, the modal link cannot be used";
-        findings.push(Finding::warning("mass", "", said, ""));
+        caveats.push(Finding::warning("mass", "", said, ""));
     }
     if has_mass && let PartMasses::Given(_) | PartMasses::Whole(_) = plan.masses {
         let found = condensed_body(&element).mass;
         if (found / whole.mass - 1.0).abs() > 0.01 {
             let said = format!("the mass matrix says {found:.6} kg, the given masses sum to {:.6} kg", whole.mass);
-            findings.push(Finding::warning("mass", "", said, "").measured(found, whole.mass));
+            caveats.push(Finding::warning("mass", "", said, "").measured(found, whole.mass));
         }
     }
     let lumped = Chain { joints: vec![link.split.clone()], parts: vec![link.proximal.clone(), link.distal.clone()] };
@@ -166,8 +166,8 @@ pub fn link_from_superelement(
     if has_mass {
         link.details = Some(Box::new(LinkDetails { superelement: Some(element), ..LinkDetails::default() }));
     }
-    findings.extend(link.warnings(&plan.limits).into_iter().map(|said| Finding::warning("gate", "", said, "")));
-    Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, findings })
+    caveats.extend(link.warnings(&plan.limits).into_iter().map(|said| Finding::warning("gate", "", said, "")));
+    Ok(MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, caveats })
 }
 
 /// Splits a body into two halves along an axis with the same total mass, centre of mass and

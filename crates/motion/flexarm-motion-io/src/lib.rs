@@ -52,7 +52,7 @@ mod yaml;
 pub use error::MotionError;
 pub use folder::{SQLITE_MAGIC, read_db3, read_folder, read_mcap, read_packed};
 pub use mcap::MCAP_MAGIC;
-pub use text::{looks_like_messages, read_text};
+pub use text::{is_message_text, read_text};
 pub use unpack::ZSTD_MAGIC;
 pub use write::{TextFormat, write_joint_trajectory};
 

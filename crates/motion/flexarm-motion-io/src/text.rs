@@ -29,7 +29,7 @@ const KEYS: [&str; 12] = [
 ];
 
 /// Whether a text looks like messages: JSON, or lines with keys of messages that hold motion.
-pub fn looks_like_messages(text: &str) -> bool {
+pub fn is_message_text(text: &str) -> bool {
     let text = text.trim_start_matches('\u{feff}').trim_start();
     if text.starts_with('{') || text.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with('{')) {
         return true;

@@ -474,7 +474,7 @@ fn refusal(result: Result<MessageMotion, MotionError>) -> String {
 fn what_is_wrong_with_a_text_is_told_with_its_line() {
     let points = "joint_names: [joint_1, joint_2]\npoints:\n";
     let cases = [
-        ("a: [1, 2]\nb: [3, 4", "t:3: the text is neither YAML nor JSON:"),
+        ("a: [1, 2]\nb: [3, 4", "t:3:1: the text is neither YAML nor JSON:"),
         ("a: 1\nb: 2\n", "t: there is no motion in the text: expected a JointTrajectory (`joint_names` and `points`)"),
         (
             &format!("{points}- positions: [0.0]\n  time_from_start: 0.0\n"),

@@ -169,7 +169,7 @@ pub enum PlanError {
     Invalid {
         /// Number of the move.
         number: Option<usize>,
-        /// What was found, what is expected, and the remedy.
+        /// Value found, value expected, and the remedy.
         message: String,
     },
 }

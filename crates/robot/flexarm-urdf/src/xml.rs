@@ -98,9 +98,10 @@ pub(crate) fn declared<'t>(text: &'t str, lines: &Lines<'_>) -> (Cow<'t, str>, V
     let mut missing: Vec<(String, Place)> = Vec::new();
     let mut root = None;
     for (at, tag, _) in tags(text).filter(|(_, tag, _)| !tag[1..].starts_with(['!', '?', '/'])) {
-        let mut words = tag.trim_start_matches('<').split_whitespace();
+        let name = tag.trim_start_matches('<').trim_start();
+        let mut words = name.split_whitespace();
         let element = words.next().unwrap_or_default();
-        root.get_or_insert(at + 1 + element.trim_end_matches(['>', '/']).len());
+        root.get_or_insert(at + tag.len() - name.len() + element.trim_end_matches(['>', '/']).len());
         let attributes = words.filter_map(|word| Some(word.split_once('=')?.0));
         for (prefix, _) in std::iter::once(element).chain(attributes).filter_map(|name| name.split_once(':')) {
             let is_name = prefix.starts_with(char::is_alphabetic)

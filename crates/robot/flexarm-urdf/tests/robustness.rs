@@ -70,6 +70,14 @@ fn check(text: &str, options: &ReadOptions) -> Vec<Finding> {
     findings
 }
 
+/// Regression: the place of undeclared prefixes was counted from the first of several `<`.
+#[test]
+fn tags_that_begin_twice_or_with_a_space_do_not_panic() {
+    for text in ["<<𒋐 a:b=1>", "<<<𒋐/ a:b=1 <c", "< 𒋐 a:b=1>", "<\n𒋐>a:b=1", "<<<<a:b"] {
+        check(text, &ReadOptions::default());
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 

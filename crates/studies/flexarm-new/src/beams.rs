@@ -180,8 +180,7 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
         return Err(format!("its width varies by a factor of {taper:.1} between the joints: not a beam").into());
     }
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
-    let whole = shell(&outlines, shape, wall);
-    let own = shell_between(&outlines, shape, length, wall);
+    let (whole, own) = (shell(&outlines, shape, wall), shell_between(&outlines, shape, length, wall));
     if own < OWN * whole {
         return Err(format!("only {:.0} % of its mass is between the joints", 100.0 * own / whole).into());
     }

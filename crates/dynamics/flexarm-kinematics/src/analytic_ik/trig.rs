@@ -90,8 +90,8 @@ pub(crate) fn dot_turned(u: &Vector3<f64>, h: &Vector3<f64>, v: &Vector3<f64>) -
     (k, u.dot(v) - k, u.dot(&h.cross(v)))
 }
 
-/// Angle about the unit axis `h`, in the axes of `a` and `b`, that rotates the component of `a` normal to `h` onto that of `b`, and the
-/// smaller of the lengths of these components.
+/// Angle about the unit axis `h`, in the axes of `a` and `b`, that rotates the part of `a` normal to
+/// `h` onto that of `b`, and the smaller of the lengths of these parts.
 pub(crate) fn angle_about(h: &Vector3<f64>, a: &Vector3<f64>, b: &Vector3<f64>) -> (f64, f64) {
     let (a, b) = (a - h * h.dot(a), b - h * h.dot(b));
     (h.dot(&a.cross(&b)).atan2(a.dot(&b)), a.norm().min(b.norm()))

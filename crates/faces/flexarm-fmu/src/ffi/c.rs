@@ -197,7 +197,7 @@ extern "C" fn flexarm_set(plant: *mut Handle, references: *const u32, values: *c
                     }
                     Some(Kind::Boolean) => {
                         let name = handle.plant.variables()[reference].name.clone();
-                        Err(FmuError::TruthValue { name, found: value })
+                        Err(FmuError::Value { name, found: value, expected: "0 or 1" })
                     }
                     _ => handle.plant.set(reference, value),
                 }

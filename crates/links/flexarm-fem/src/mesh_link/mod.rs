@@ -103,7 +103,7 @@ pub struct MeshReduction {
     /// Stress at the nodes of the surface, if requested.
     pub stress: Option<StressFields>,
     /// Warnings about accepted but suspicious input.
-    pub findings: Vec<Finding>,
+    pub caveats: Vec<Finding>,
 }
 
 /// Steps of a reduction, for progress displays.
@@ -165,8 +165,8 @@ pub fn reduce_mesh(
     step(ReductionStep::Parts);
     let densities: Vec<f64> = materials.iter().map(|m| m.rho).collect();
     let whole = mass_properties(mesh, &densities)?;
-    let mut findings = suspicious(mesh, &bodies);
-    let mut link = two_part_link(mesh, plan, &densities, &superelement, &mut findings)?;
+    let mut caveats = suspicious(mesh, &bodies);
+    let mut link = two_part_link(mesh, plan, &densities, &superelement, &mut caveats)?;
 
     // Chains and checks against the mesh; then the attached bodies.
     let bare_chains = bare_chains(mesh, plan, &model, &materials, &unit_loads)?;
@@ -174,8 +174,8 @@ pub fn reduce_mesh(
     gate.order = check_order(mesh, &plan.assembly, &plan.interfaces, &condensation, &unit_loads)?;
     let mut chains = bare_chains.clone();
     attach(&plan.attached, &mut link, &mut chains)?;
-    findings.extend(gate.findings());
-    findings.extend(implausible(mesh, &whole, &held_modes));
+    caveats.extend(gate.findings());
+    caveats.extend(implausible(mesh, &whole, &held_modes));
     let modal = ModalSource {
         mesh,
         materials: &materials,
@@ -194,22 +194,11 @@ pub fn reduce_mesh(
         modal: Some(modal),
         gate: Some(gate),
     }));
-    findings.extend(link.warnings(&plan.limits).into_iter().map(|said| Finding::warning("gate", "", said, "")));
+    caveats.extend(link.warnings(&plan.limits).into_iter().map(|said| Finding::warning("gate", "", said, "")));
     let inertia_solves = [plan.geometric, plan.stress].into_iter().filter(|wanted| *wanted).count() * INERTIA_LOADS;
     let solves = fixed_modes.solves + held_modes.solves + condensation.figures().static_solves + inertia_solves;
     let solver = condensation.figures();
-    Ok(MeshReduction {
-        link,
-        whole,
-        solver,
-        unit_loads,
-        fixed_modes,
-        held_modes,
-        bare_chains,
-        solves,
-        stress,
-        findings,
-    })
+    Ok(MeshReduction { link, whole, solver, unit_loads, fixed_modes, held_modes, bare_chains, solves, stress, caveats })
 }
 
 /// Checks the mesh and, before the expensive work, whether frames are in wrong units.
@@ -228,12 +217,12 @@ fn two_part_link(
     plan: &LinkPlan,
     densities: &[f64],
     superelement: &Superelement,
-    findings: &mut Vec<Finding>,
+    caveats: &mut Vec<Finding>,
 ) -> Result<ReducedLink, MeshLinkError> {
     let loose = FemError::Missing { what: "stiffness of the third interface", help: "it holds nothing" };
     let K12 = stiffness12(superelement).ok_or(loose)?;
     let frames = LinkFrames::new(plan.interfaces[0].X_LI, plan.interfaces[1].X_LI);
-    let (frames, parts) = split(mesh, densities, frames, &K12, plan.split, findings)?;
+    let (frames, parts) = split(mesh, densities, frames, &K12, plan.split, caveats)?;
     Ok(ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?)
 }
 

@@ -63,15 +63,15 @@ fn torques(case: &mut Case, found: &Torques) {
         let text = format!("torque of axis {} in the unseen runs", axis + 1);
         case.claim(text, "recorded motor torques", worst_unseen(0, axis), Bound::AtMost(bound));
     }
-    let seen =
+    let least =
         |variant: usize, axis: usize| found.errors[variant].iter().map(|run| run[axis]).fold(f64::INFINITY, f64::min);
     case.claim(
         "the same of axis 2 without the counterbalance",
         "recorded motor torques",
-        seen(1, 1),
+        least(1, 1),
         Bound::AtLeast(0.3),
     );
-    case.claim("the same of axis 1 without the rotors", "recorded motor torques", seen(2, 0), Bound::AtLeast(0.2));
+    case.claim("the same of axis 1 without the rotors", "recorded motor torques", least(2, 0), Bound::AtLeast(0.2));
     let mut table = Table::new(
         "Friction of run 1, on the joint's side.",
         &["axis", "offset [N m]", "viscous [N m s/rad]", "Coulomb [N m]"],

@@ -143,11 +143,11 @@ fn along(bar: &Stiffness, chains: &[Chain], places_m: &[f64], a: f64, k: usize) 
     let drawn = chains.iter().filter(|chain| DRAWN_COUNTS.contains(&chain.parts));
     let parts = drawn.map(|chain| {
         let loaded = chain.at(a);
-        let seen = places_m.iter().map(|x| {
+        let offsets = places_m.iter().map(|x| {
             let u = loaded.statics_at(&StationLoad::Force.wrench(), &chain.at(*x))?;
             Ok(if k == 0 { u[2] } else { -u[4] })
         });
-        Ok((chain.parts, seen.collect::<Result<_, Error>>()?))
+        Ok((chain.parts, offsets.collect::<Result<_, Error>>()?))
     });
     Ok(Along { closed, parts: parts.collect::<Result<_, Error>>()? })
 }

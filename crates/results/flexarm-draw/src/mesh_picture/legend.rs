@@ -92,10 +92,10 @@ pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]
     column.line(&format!("A to B {} mm", numbers::significant(along.norm() * 1e3, 4)), faint);
     let mesh = pictures.mesh;
     column.line(&format!("{} elements, {} nodes", mesh.element_count(), mesh.nodes.len()), faint);
-    if !reduction.findings.is_empty() {
+    if !reduction.caveats.is_empty() {
         column.y += 9.0;
-        column.line(&format!("{} warning(s) of the reduction:", reduction.findings.len()), alert);
-        for warning in &reduction.findings {
+        column.line(&format!("{} warning(s) of the reduction:", reduction.caveats.len()), alert);
+        for warning in &reduction.caveats {
             column.line(&warning.message, Style::new(13.0, color::ALERT));
         }
     }

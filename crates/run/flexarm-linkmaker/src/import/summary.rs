@@ -182,10 +182,10 @@ impl ImportSummary {
 ///
 /// * `mass`: relative error of the masses along x, y, z, and the masses (kg).
 fn findings(reduction: &MatrixReduction, warnings: &[String], mass: Option<(f64, [f64; 3])>) -> Vec<Finding> {
-    let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, findings } = reduction;
+    let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, caveats } = reduction;
     let mut all: Vec<Finding> =
         warnings.iter().map(|sentence| Finding::warning("matrix-file", "", sentence, "")).collect();
-    all.extend(findings.iter().cloned());
+    all.extend(caveats.iter().cloned());
     if let Some((error, m)) = mass.filter(|(error, _)| error.is_nan() || *error > MASS_ERROR) {
         let sentence = format!("the mass matrix has {:.6}, {:.6}, {:.6} kg along x, y, z", m[0], m[1], m[2]);
         all.push(Finding::warning("mass", "", sentence, "").measured(error, MASS_ERROR));

@@ -449,7 +449,7 @@ fn caveats_of(
     chosen: &[SelectedInterface],
     nodes: usize,
 ) -> Vec<Finding> {
-    let mut findings = reduction.findings.clone();
+    let mut findings = reduction.caveats.clone();
     findings.extend(first_mode.iter().flat_map(|m| coarse("the mesh", m.lumped_error, m.reduced_error)));
     findings.extend(yardsticks::of_link(&reduction.link, &reduction.whole));
     findings.extend(spreads(chosen, nodes));

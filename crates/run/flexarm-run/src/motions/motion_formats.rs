@@ -5,8 +5,8 @@ use std::io::Read;
 use std::path::Path;
 
 use flexarm_motion_io::{
-    MCAP_MAGIC, MessageMotion, MotionError, Request, SQLITE_MAGIC, ZSTD_MAGIC, looks_like_messages, read_db3,
-    read_folder, read_mcap, read_packed, read_text,
+    MCAP_MAGIC, MessageMotion, MotionError, Request, SQLITE_MAGIC, ZSTD_MAGIC, is_message_text, read_db3, read_folder,
+    read_mcap, read_packed, read_text,
 };
 use flexarm_settings::{Finding, Setting};
 use flexarm_trajectory::{ColumnMap, JointLimits, KnownJoint, TableRequest, Trajectory, text_of_file};
@@ -193,12 +193,12 @@ fn is_toml(head: &Head<'_>) -> bool {
 /// Whether the content is a robot program; tables and message texts are excluded whatever their
 /// lines look like.
 fn is_program(head: &Head<'_>) -> bool {
-    let other = ["yaml", "yml", "json", "csv"].contains(&head.ending) || looks_like_messages(head.text);
+    let other = ["yaml", "yml", "json", "csv"].contains(&head.ending) || is_message_text(head.text);
     !other && recognise(head.bytes, &format!("x.{}", head.ending)).is_some()
 }
 
 fn is_message(head: &Head<'_>) -> bool {
-    ["yaml", "yml", "json"].contains(&head.ending) || looks_like_messages(head.text)
+    ["yaml", "yml", "json"].contains(&head.ending) || is_message_text(head.text)
 }
 
 /// Whether some line consists mostly of numbers, at least two.

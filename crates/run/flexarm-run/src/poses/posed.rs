@@ -138,9 +138,9 @@ impl Posed {
     /// As [`Self::new`], for equilibria alone: an arm with a link between springs that has no mass
     /// has no modes.
     pub(crate) fn resting(arm: Arc<Arm>, at: Vec<f64>) -> Result<Self, Error> {
-        let held = Arc::new(Held(at.clone()));
-        let plant = match arm.plant(held.clone()) {
-            Err(StepError::Singular { matrix, .. }) if matrix.starts_with("mass matrix") => arm.plant_at_rest(held),
+        let fixed = Arc::new(Held(at.clone()));
+        let plant = match arm.plant(fixed.clone()) {
+            Err(StepError::Singular { matrix, .. }) if matrix.starts_with("mass matrix") => arm.plant_at_rest(fixed),
             plant => plant,
         };
         Self::of(arm, plant, at)

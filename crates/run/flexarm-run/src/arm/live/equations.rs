@@ -157,7 +157,7 @@ impl Equations {
 
     fn evaluate(&mut self) -> Result<(), Error> {
         self.equations.evaluate().map_err(|source| Error::Step { source, partial: false })?;
-        self.equations.observe(&mut self.readings.seen);
+        self.equations.observe(&mut self.readings.observed);
         Ok(())
     }
 

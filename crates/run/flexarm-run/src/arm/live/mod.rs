@@ -83,7 +83,7 @@ pub struct LiveState {
     push: Wrench,
     has_payload: bool,
     stepper: Box<dyn Stepper>,
-    seen: Observation,
+    observed: Observation,
 }
 
 /// Targets at the start and the end of a control period.
@@ -352,9 +352,9 @@ fn started(
     };
     let mut stepper = start(Plant::clone(plant))?;
     if servos == Servos::Open {
-        let mut seen = Observation::new(plant);
-        stepper.observe(&mut seen);
-        targets.0.write().unwrap_or_else(PoisonError::into_inner).torque.copy_from_slice(seen.drive.as_slice());
+        let mut observed = Observation::new(plant);
+        stepper.observe(&mut observed);
+        targets.0.write().unwrap_or_else(PoisonError::into_inner).torque.copy_from_slice(observed.drive.as_slice());
         stepper = start(plant.with_servo_opened())?;
     }
     Ok(stepper)
@@ -450,7 +450,7 @@ impl Live {
             push: *self.push.read().unwrap_or_else(PoisonError::into_inner),
             has_payload: self.has_payload,
             stepper,
-            seen: self.readings.seen.clone(),
+            observed: self.readings.observed.clone(),
         })
     }
 
@@ -468,7 +468,7 @@ impl Live {
         self.targets.0.write().unwrap_or_else(PoisonError::into_inner).clone_from(&state.period);
         *self.push.write().unwrap_or_else(PoisonError::into_inner) = state.push;
         self.has_payload = state.has_payload;
-        self.readings.seen.clone_from(&state.seen);
+        self.readings.observed.clone_from(&state.observed);
         self.readings.set_targets(&state.period.q[1]);
         Ok(())
     }
@@ -486,7 +486,7 @@ impl Live {
     }
 
     fn observe(&mut self) {
-        self.stepper.observe(&mut self.readings.seen);
+        self.stepper.observe(&mut self.readings.observed);
         let period = self.targets.0.read().unwrap_or_else(PoisonError::into_inner);
         self.readings.set_targets(&period.q[1]);
     }

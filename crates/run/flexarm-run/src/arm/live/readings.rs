@@ -17,7 +17,7 @@ use crate::run::monitor::stress::StressMonitor;
 /// Quantities of an arm at its current state.
 pub struct Readings {
     arm: Arc<Arm>,
-    pub(super) seen: Observation,
+    pub(super) observed: Observation,
     /// Workspaces for the poses of the rigid arm at the targets and for the velocities of the
     /// flexible one.
     rigid: (Data, State),
@@ -40,7 +40,7 @@ impl Readings {
             }
         };
         Ok(Self {
-            seen: Observation::new(commanded),
+            observed: Observation::new(commanded),
             rigid: (Data::new(&arm.rigid), State::zeros(&arm.rigid)),
             moving: (Data::new(&arm.model), State::zeros(&arm.model)),
             link_sides: link_side_angles(arm.robot(), arm),
@@ -56,32 +56,32 @@ impl Readings {
 
     /// Returns the time (s).
     pub fn time_s(&self) -> f64 {
-        self.seen.t
+        self.observed.t
     }
 
     /// Returns the actual joint positions (rad or m); under servos they lag behind their targets.
     pub fn position(&self) -> &[f64] {
-        &self.seen.q.as_slice()[..self.arm.model.n_actuated()]
+        &self.observed.q.as_slice()[..self.arm.model.n_actuated()]
     }
 
     /// Returns the joint velocities (rad/s or m/s).
     pub fn velocity(&self) -> &[f64] {
-        &self.seen.qdot.as_slice()[..self.arm.model.n_actuated()]
+        &self.observed.qdot.as_slice()[..self.arm.model.n_actuated()]
     }
 
     /// Returns the torques or forces of the drives (N m or N).
     pub fn effort(&self) -> &[f64] {
-        self.seen.drive.as_slice()
+        self.observed.drive.as_slice()
     }
 
     /// Returns the joint positions at the links: with the deflections of the gearboxes (rad or m).
     pub fn link_position(&self) -> Vec<f64> {
-        self.at_links(self.seen.q.as_slice())
+        self.at_links(self.observed.q.as_slice())
     }
 
     /// Returns the joint velocities at the links (rad/s or m/s).
     pub fn link_velocity(&self) -> Vec<f64> {
-        self.at_links(self.seen.qdot.as_slice())
+        self.at_links(self.observed.qdot.as_slice())
     }
 
     fn at_links(&self, values: &[f64]) -> Vec<f64> {
@@ -94,36 +94,36 @@ impl Readings {
 
     /// Returns the joint accelerations (rad/s² or m/s²); NaN with a stepper that has none.
     pub fn acceleration(&self) -> &[f64] {
-        &self.seen.qddot.as_slice()[..self.arm.model.n_actuated()]
+        &self.observed.qddot.as_slice()[..self.arm.model.n_actuated()]
     }
 
     /// Returns the elastic coordinates.
     pub fn deflection(&self) -> &[f64] {
-        &self.seen.q.as_slice()[self.arm.model.n_actuated()..]
+        &self.observed.q.as_slice()[self.arm.model.n_actuated()..]
     }
 
     /// Returns the velocities of the elastic coordinates (per s).
     pub fn deflection_velocity(&self) -> &[f64] {
-        &self.seen.qdot.as_slice()[self.arm.model.n_actuated()..]
+        &self.observed.qdot.as_slice()[self.arm.model.n_actuated()..]
     }
 
     /// Returns the accelerations of the elastic coordinates (per s²); NaN with a stepper that has
     /// none.
     pub fn deflection_acceleration(&self) -> &[f64] {
-        &self.seen.qddot.as_slice()[self.arm.model.n_actuated()..]
+        &self.observed.qddot.as_slice()[self.arm.model.n_actuated()..]
     }
 
     /// Returns the TCP pose in the world.
     pub fn tcp_pose(&self) -> Pose {
         let tcp = &self.arm.tcp;
-        self.seen.X_WB[tcp.body] * tcp.X_BF
+        self.observed.X_WB[tcp.body] * tcp.X_BF
     }
 
     /// Returns the velocity of the TCP: linear, then angular, world axes (m/s, rad/s).
     pub fn tcp_velocity(&mut self) -> Vector6<f64> {
         let (data, state) = &mut self.moving;
-        state.q.copy_from(&self.seen.q);
-        state.qdot.copy_from(&self.seen.qdot);
+        state.q.copy_from(&self.observed.q);
+        state.qdot.copy_from(&self.observed.qdot);
         forward_kinematics_velocity(&self.arm.model, data, state);
         let V = frame_twist(data, &self.arm.tcp);
         Vector6::from_iterator(V.linear.iter().chain(V.angular.iter()).copied())
@@ -134,12 +134,12 @@ impl Readings {
     pub fn tcp_acceleration(&mut self) -> Vector3<f64> {
         let (model, tcp) = (&self.arm.model, &self.arm.tcp);
         let (data, state) = &mut self.moving;
-        state.q.copy_from(&self.seen.q);
-        state.qdot.copy_from(&self.seen.qdot);
-        inverse_dynamics(model, data, state, &self.seen.qddot);
+        state.q.copy_from(&self.observed.q);
+        state.qdot.copy_from(&self.observed.qdot);
+        inverse_dynamics(model, data, state, &self.observed.qddot);
         // Spatial acceleration plus ω × v, without the gravity term.
         let (V, A) = (data.V[tcp.body].at_child(&tcp.X_BF), data.A[tcp.body].at_child(&tcp.X_BF));
-        let R = self.seen.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
+        let R = self.observed.X_WB[tcp.body].rotation * tcp.X_BF.rotation;
         R * (A.linear + V.angular.cross(&V.linear)) + model.gravity
     }
 
@@ -155,8 +155,8 @@ impl Readings {
         let mut values = Vec::new();
         if let Some(stress) = &mut self.stress {
             stress.clear();
-            stress.update(&self.seen);
-            stress.read_gauges(&self.seen, &mut values);
+            stress.update(&self.observed);
+            stress.read_gauges(&self.observed, &mut values);
         }
         values
     }

@@ -197,7 +197,8 @@ impl ToolPath {
         warnings: Vec<String>,
     ) -> Result<(Trajectory, Self), Error> {
         let planned = plan(program, arm, options).map_err(|mut finding| {
-            if finding.location.is_empty() {
+            // Findings about the program as a whole.
+            if finding.location.is_empty() || finding.location == program.name {
                 finding.location = file.display().to_string();
             }
             let notes =
