@@ -256,9 +256,9 @@ fn limits_of_a_urdf_in_other_units_are_told() {
     let urdf = std::fs::read_to_string(project.join("robots/kr210/kr210.urdf")).unwrap();
     // Multiplies the values of some attributes of <limit>.
     let scaled = |keys: &[&str], factor: f64| {
-        let change = |line: &str| {
-            let mut line = line.to_owned();
-            for key in keys.iter().filter(|_| line.contains("<limit ")) {
+        let change = |original: &str| {
+            let mut line = original.to_owned();
+            for key in keys.iter().filter(|_| original.contains("<limit ")) {
                 let Some((before, rest)) = line.split_once(&format!("{key}=\"")) else { continue };
                 let (value, after) = rest.split_once('"').unwrap();
                 let value = value.parse::<f64>().unwrap() * factor;
