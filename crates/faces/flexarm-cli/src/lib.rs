@@ -46,6 +46,7 @@ use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
+use std::sync::Mutex;
 
 use clap::builder::{PossibleValue, Resettable, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
@@ -123,8 +124,7 @@ pub fn whole_help(line: &[OsString]) -> StyledStr {
 }
 
 /// Starts the threads that share the work of a command: as many as there are processors, or fewer
-/// if the environment says so. Where the system starts only some of them, as under a limit of
-/// memory, these do all the work.
+/// if the environment says so or the system starts fewer, as under a limit of memory.
 ///
 /// # Errors
 /// If it starts none.
@@ -132,21 +132,36 @@ fn start_threads() -> std::io::Result<()> {
     if cfg!(target_family = "wasm") {
         return Ok(()); // there are none
     }
-    let mut started: std::io::Result<()> = Err(std::io::ErrorKind::OutOfMemory.into());
-    let spawn = |thread: rayon::ThreadBuilder| {
-        match std::thread::Builder::new().spawn(|| thread.run()) {
-            Ok(_) => started = Ok(()),
-            Err(error) if started.is_err() => started = Err(error),
-            Err(_) => {}
+    let processors = std::thread::available_parallelism()?.get();
+    let wanted = asked_threads().map_or(processors, |asked| asked.min(processors));
+    // The memory of one more thread is left for the pool itself.
+    let number = startable(wanted + 1)?.saturating_sub(1).max(1);
+    // Fails only if there is a pool already, which then stays as it is.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(number).build_global();
+    Ok(())
+}
+
+/// Returns how many of some threads the system starts: a pool that gets only a part of its threads
+/// does not work.
+fn startable(wanted: usize) -> std::io::Result<usize> {
+    let gate = Mutex::new(());
+    std::thread::scope(|scope| {
+        let closed = gate.lock();
+        let start = |_| std::thread::Builder::new().spawn_scoped(scope, || drop(gate.lock()));
+        let mut started = 0;
+        let refused = (0..wanted).map(start).find_map(|thread| match thread {
+            Ok(_) => {
+                started += 1;
+                None
+            }
+            Err(error) => Some(error),
+        });
+        drop(closed);
+        match refused {
+            Some(error) if started == 0 => Err(error),
+            _ => Ok(started),
         }
-        Ok(())
-    };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(fewer_threads().unwrap_or(0));
-    match pool.spawn_handler(spawn).build_global() {
-        Ok(()) => started,
-        // There is a pool already, which stays as it is.
-        Err(_) => Ok(()),
-    }
+    })
 }
 
 /// Variable of the environment with the number of threads.
@@ -156,10 +171,14 @@ pub const THREADS: &str = "RAYON_NUM_THREADS";
 /// ([`THREADS`]), which cost time and memory and compute nothing sooner.
 pub fn fewer_threads() -> Option<usize> {
     let processors = std::thread::available_parallelism().ok()?.get();
+    (asked_threads()? > processors).then_some(processors)
+}
+
+/// Returns the number of threads for which the environment asks.
+fn asked_threads() -> Option<usize> {
     // The second name is an older one of the same number.
     let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<usize>().ok());
-    let asked = [THREADS, "RAYON_RS_NUM_CPUS"].into_iter().find_map(number)?;
-    (asked > processors).then_some(processors)
+    [THREADS, "RAYON_RS_NUM_CPUS"].into_iter().find_map(number).filter(|number| *number > 0)
 }
 
 /// Escapes control characters in the quoted user input, which a terminal would execute.

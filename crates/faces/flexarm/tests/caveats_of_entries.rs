@@ -203,7 +203,7 @@ fn lists_that_are_longer_than_their_keys_take_are_refused() {
                 "from = { link = \"link_1\", xyz = [0.0,",
                 "from = { link = \"link_1\", xyz = [0,0, 0,",
                 "robot-file",
-                "4 values",
+                "5 values",
             ),
             ("curve = [[-2.4, 50.0]", "curve = [[-2,4, 50.0]", "robot-file", "the list has 3 values, expected 2"),
             (
@@ -232,7 +232,7 @@ fn lists_that_are_longer_than_their_keys_take_are_refused() {
 /// Seat and shaft turn the same link about the same axes: the message names them, not a link that
 /// lacks a mass.
 #[test]
-fn a_seat_beside_three_stiffnesses_is_named_where_modes_need_inertia() {
+fn a_seat_beside_three_stiffnesses_is_named_as_modes_need_inertia_between_them() {
     let folder = Folder::new("seat");
     let sound = drives_with_entries();
     let three = "gearbox = { seat = [1e7, 1e7], stiffness = [1e7, 1e7, 3376721.9], damping = [1e3, 1e3, 4481.0] }";
@@ -241,7 +241,7 @@ fn a_seat_beside_three_stiffnesses_is_named_where_modes_need_inertia() {
         &[(
             "gearbox = { stiffness = 3376721.9, damping = 4481.0 }",
             three,
-            "no-equilibrium",
+            "seat-inertia",
             "its seat and its three stiffnesses",
         )],
     );
@@ -278,7 +278,7 @@ fn limits_of_a_urdf_in_other_units_are_told() {
     assert_eq!(told(&urdf), [""; 0]);
     let (turn, degree) = (60.0 / std::f64::consts::TAU, 180.0 / std::f64::consts::PI);
     for (keys, factor, number, part) in [
-        (&["velocity"][..], turn, 6, "1/min?"),
+        (&["velocity"][..], turn, 5, "1/min?"),
         (&["velocity"], degree, 6, "degrees?"),
         (&["velocity"], 1.0 / degree, 1, "converted to radians twice?"),
         (&["lower", "upper"], degree, 6, "degrees?"),
@@ -344,7 +344,7 @@ fn slips_in_loads_and_paths_are_told() {
         (&*path, "joint_speed = 0.3", "joint_speed = 30.0", "per cent?"),
         (&*path, "blend = 8.0", "blend = 0.008", "its blend is"),
         (&*path, "{ acceleration = 300.0 }", "{ acceleration = 5.2 }", "the time to its full speed"),
-        (&*path, "dwell = 0.3", "dwell = 300.0", "rests for 300.2 s"),
+        (&*path, "dwell = 0.3", "dwell = 300.0", "milliseconds?"),
         (&*moves, "velocity = 110.0", "velocity = 1.92", "its speed limit over that of the robot"),
         (&*moves, "acceleration = 250.0", "acceleration = 4.4", "the time to its full speed"),
         (&*moves, "jerk = 2500.0", "jerk = 44.0", "the time to its full acceleration"),

@@ -12,14 +12,14 @@ pub(crate) mod servo_gains;
 
 use std::sync::{Arc, OnceLock};
 
-use flexarm_flexlink::{FlexibleSpan, GearStiffness};
+use flexarm_flexlink::FlexibleSpan;
 use flexarm_kinematics::{Data, Frame, Model, mass_matrix};
 use flexarm_stepping::{Friction, GearCoupling, Plant, PrescribedMotion, Servo, Spring, StepError};
 use nalgebra::{DMatrix, DVector};
 
 use crate::arm::bends::Bend;
 use crate::arm::options::Modelling;
-use crate::caveat::Finding;
+use crate::caveat::{self, Finding};
 use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot::drive_entry::ServoEntry;
@@ -150,17 +150,8 @@ impl Arm {
         if light.is_empty() {
             return Error::Step { source, partial: false };
         }
-        let seated = self.robot.drives.iter().find(|drive| {
-            let gearbox = drive.gearbox.as_ref().map(|(gearbox, _)| gearbox);
-            gearbox.is_some_and(|gear| gear.seat.is_some() && !matches!(gear.stiffness, GearStiffness::Axis(_)))
-        });
-        if let Some(drive) = seated {
-            return Error::Pose(format!(
-                "{}: {source}: drive of joint {:?}: its seat and its three stiffnesses turn the same link about the same \
-                 axes, and no inertia is between them: give the stiffness about the axis alone (statics and identify take three)",
-                self.robot.path.display(),
-                drive.joint
-            ));
+        if let Some(seat) = self.robot.drives.iter().find_map(caveat::drives::seat) {
+            return Error::Pose(format!("{}: {source}: {}", self.robot.path.display(), seat.message));
         }
         Error::Pose(format!(
             "{}: {source}: {} lacks inertia about some axis, with all that it carries; give the links <inertial> \

@@ -85,6 +85,7 @@ pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) 
         let load = drive.load_friction;
         caveats.extend(outside(&kinds::LOAD_FRICTION, name(drive), load, &(0.0..=LOAD_FRICTION), per_cent, 1.0));
         caveats.extend(servo(drive, effort));
+        caveats.extend(seat(drive));
         if !slides && drive.kind != DriveKind::Prescribed {
             caveats.extend(gear(drive, effort, others_turn(drive, drives, mechanism)));
             caveats.extend(errors(drive));
@@ -273,6 +274,13 @@ pub(crate) fn speed_loop(joint: &str, gain: f64, sample_s: f64, inertia: f64) ->
     let name = || format!("joint {joint:?}");
     let judge = || outside(&kinds::VELOCITY_GAIN, name(), gain, &range, &[(1e-3, "kN m s/rad")], 1.0);
     (inertia > 0.0 && gain != 0.0).then(judge).flatten()
+}
+
+/// Checks whether springs before and after the joint turn the same link about the same axes.
+pub(crate) fn seat(drive: &Drive) -> Option<Finding> {
+    let (gearbox, _) = drive.gearbox.as_ref()?;
+    let several = !matches!(gearbox.stiffness, GearStiffness::Axis(_));
+    (gearbox.seat.is_some() && several).then(|| kinds::SEAT_INERTIA.found(name(drive), 0.0, 0.0))
 }
 
 /// Checks the integral over the velocity gain of a servo (1/s).

@@ -93,3 +93,11 @@ pub(crate) const ROTARY: FindingKind = FindingKind::warning(
     "m",
     "rotary_y and rotary_z are rho I in kg m",
 );
+/// Springs before and after a joint have no inertia between them.
+pub(crate) const SEAT_INERTIA: FindingKind = FindingKind::warning(
+    "seat-inertia",
+    "{where}: its seat and its three stiffnesses turn the same link about the same axes with no inertia between them: \
+     only statics and identify can use it",
+    "",
+    "give the stiffness about the axis alone",
+);

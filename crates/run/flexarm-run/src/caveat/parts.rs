@@ -29,7 +29,7 @@ const FAST: (f64, f64) = (30.0, 120.0);
 /// Joint speed that no robot has (rad/s); the fastest SCARA and delta robots have 45.
 const FASTEST: f64 = 50.0;
 /// Speed of the tip (m/s) that the speed limit of a joint allows at most; delta robots have 10.
-const SWEEP: f64 = 25.0;
+const SWEEP: f64 = 40.0;
 /// Speed limit (rad/s) of the fastest joint of an arm that is shorter than a crane (m).
 const SLOWEST: (f64, f64) = (0.1, 10.0);
 /// Minimum range of a joint (rad), unless few joints have less.
@@ -196,8 +196,8 @@ fn joint_limits(mechanism: &Mechanism, size: &Size) -> Vec<Finding> {
         let most = if arm { FAST.0.min(SWEEP / reach) } else { FAST.0 };
         let caveat = (speed > most).then(|| kinds::SPEED_LIMIT.found(name(joint), speed, most));
         let [degrees, turns] = [slip::ANGLE[0], (60.0 / TURN, "1/min")];
-        // In degrees a limit is at least 30 per second.
-        let likely = match slip(speed, &(0.5..=most), &[degrees], 1.0) {
+        // In degrees a limit is at least 40 per second.
+        let likely = match slip(speed, &(0.7..=most), &[degrees], 1.0) {
             none if none.is_empty() => slip(speed, &(0.05..=most), &[turns, degrees], 1.0),
             found => found,
         };
