@@ -160,8 +160,11 @@ fn malformed(path: &Path, reason: impl Into<String>) -> Box<Finding> {
     mesh_error(path.display(), format!("not a sound glTF file: {}", reason.into()))
 }
 
-/// Splits a file into JSON and, of a binary one, the bytes after it.
-fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), Box<Finding>> {
+/// JSON and, of a binary file, the bytes after it.
+type Parts<'a> = (&'a [u8], Option<&'a [u8]>);
+
+/// Splits a file.
+fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>, Box<Finding>> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
     }

@@ -20,8 +20,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Re
         }
     };
     let scene = mesh_loader::Loader::default().load_obj_from_slice_with_reader(bytes, path, read_file);
-    let scene =
-        scene.map_err(|error| mesh_error(path.display(), format!("not a sound OBJ file: {}", error.to_string())))?;
+    let scene = scene.map_err(|error| mesh_error(path.display(), format!("not a sound OBJ file: {error}")))?;
     merged(scene, path)
 }
 

@@ -48,17 +48,17 @@ impl Element {
 }
 
 /// Parses a text and returns its root element.
-pub(crate) fn parse(text: &str, file: &Rc<Path>) -> Result<Element, Box<Finding>> {
+pub(crate) fn parse(text: &str, file: &Path) -> Result<Element, Box<Finding>> {
     let lines = xml::Lines::new(file, text);
     let document = xml::parse(text, &lines)?;
     let deepest = document.descendants().find(|n| n.ancestors().nth(MAX_NESTED).is_some());
     if let Some(node) = deepest {
         return Err(Box::new(xml::issue(lines.of(node), format_args!("elements nested {MAX_NESTED} deep"), "fewer")));
     }
-    Ok(element(&document, document.root_element(), &lines, file))
+    Ok(element(&document, document.root_element(), &lines))
 }
 
-fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::Lines<'_>, file: &Rc<Path>) -> Element {
+fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::Lines<'_>) -> Element {
     let text = document.input_text();
     let range = node.range();
     // The name with its prefix follows the bracket.
@@ -77,7 +77,7 @@ fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::
     });
     let attributes = declared.chain(plain).collect();
     let children = node.children().filter_map(|child| match child.node_type() {
-        NodeType::Element => Some(Node::Element(Rc::new(element(document, child, lines, file)))),
+        NodeType::Element => Some(Node::Element(Rc::new(element(document, child, lines)))),
         NodeType::Text => {
             let words = child.text().unwrap_or_default().to_owned();
             let literal = text.get(child.range()).is_some_and(|source| source.starts_with("<![CDATA["));
