@@ -48,9 +48,12 @@ pub enum ReductionError {
         component: &'static str,
     },
     /// The factor does not fit into memory.
-    #[error("the factor of {entries} numbers does not fit into memory; coarsen the mesh")]
+    #[error("the factor{} does not fit into memory; coarsen the mesh", match entries {
+        0 => String::new(),
+        entries => format!(" of {entries} numbers"),
+    })]
     OutOfMemory {
-        /// Number of entries of the factor.
+        /// Number of entries of the factor; 0 if they cannot be counted.
         entries: usize,
     },
     /// An interface after the first can move without force.
@@ -156,8 +159,7 @@ impl<'m> Condensation<'m> {
             Some(R)
         };
         // K_ii = L Lᵀ; a pivot near zero is a mechanism.
-        let K_ii = model.K.submatrix(&solved);
-        let factor = Cholesky::new(K_ii, options.ordering).map_err(|error| match error {
+        let factor = Cholesky::new(&model.K.submatrix(&solved), options.ordering).map_err(|error| match error {
             NotPositiveDefinite::Pivot { unknown } => {
                 let (node, component) = model.dofs.node_of(solved[unknown] as usize);
                 ReductionError::Loose { node, component: crate::error::COMPONENTS[component] }

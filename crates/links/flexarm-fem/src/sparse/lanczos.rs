@@ -268,7 +268,7 @@ mod tests {
     }
 
     fn modes_of(K: &SparseSymmetric, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree).unwrap();
+        let factor = Cholesky::new(K, Ordering::MinimumDegree).unwrap();
         let solve = &mut |F: &mut Block| factor.solve_block(F);
         let mass = &mut |X: &Block, Y: &mut Block| Y.clone_from(X);
         smallest_modes(&mut Pencil { rows: K.size(), dimension: K.size(), solve, mass }, wanted)
@@ -308,7 +308,7 @@ mod tests {
     #[test]
     fn a_body_without_mass_has_no_modes() {
         let (K, _) = chain(20, 1);
-        let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree).unwrap();
+        let factor = Cholesky::new(&K, Ordering::MinimumDegree).unwrap();
         let solve = &mut |F: &mut Block| factor.solve_block(F);
         let mass = &mut |_: &Block, Y: &mut Block| *Y = Block::zeros(20, Y.width);
         let found = smallest_modes(&mut Pencil { rows: 20, dimension: 20, solve, mass }, ModesWanted::Count(3));

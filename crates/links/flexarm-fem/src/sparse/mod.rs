@@ -21,7 +21,6 @@ mod lanczos;
 mod ordering;
 mod registers;
 mod symmetric;
-mod triangular;
 mod vectors;
 
 pub use block::{Block, WIDTH};

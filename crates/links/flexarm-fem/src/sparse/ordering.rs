@@ -139,7 +139,7 @@ mod tests {
             triplets.extend(coupled.map(|j| (i, j, if i == j { 30.0 } else { -1.0 })));
         }
         let A = SparseSymmetric::from_triplets(side.pow(3) as usize, &triplets);
-        let entries = |ordering| Cholesky::new(A.clone(), ordering).unwrap().figures().factor_entries as f64;
+        let entries = |ordering| Cholesky::new(&A, ordering).unwrap().figures().factor_entries as f64;
         let ratio = entries(Ordering::NestedDissection) / entries(Ordering::MinimumDegree);
         assert!(ratio < 0.9, "{ratio:.3}");
     }

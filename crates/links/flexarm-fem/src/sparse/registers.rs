@@ -3,7 +3,6 @@
 //! Its assembly kernels leave the upper halves of the registers in use. The processor then
 //! preserves them in every instruction that uses only the lower halves, which is most of this
 //! program, at a third of the speed, until they are cleared.
-//! program, at a third of its speed, until they are cleared.
 
 /// Empty work over lanes, which ends like all such functions with the upper halves cleared.
 #[cfg(target_arch = "x86_64")]

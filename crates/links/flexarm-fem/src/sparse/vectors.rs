@@ -81,13 +81,4 @@ impl<T: Real, const P: usize> Wide<T, P> {
             self.0[p] -= factor * other.0[p];
         }
     }
-
-    /// Computes `self *= factor`.
-    #[inline(always)]
-    pub(crate) fn scale(&mut self, factor: f64) {
-        let factor = T::splat(factor);
-        for p in 0..P {
-            self.0[p] *= factor;
-        }
-    }
 }

@@ -69,7 +69,7 @@ mod tests {
             let mut triplets: Vec<_> = (0..m as u32).map(|i| (i, i, 2.0)).collect();
             triplets.extend((1..m as u32).map(|i| (i, i - 1, -1.0)));
             let K = SparseSymmetric::from_triplets(m, &triplets);
-            let factor = Cholesky::new(K.clone(), Ordering::MinimumDegree).unwrap();
+            let factor = Cholesky::new(&K, Ordering::MinimumDegree).unwrap();
             let solve = &mut |F: &mut Block| {
                 let mut inner = Block { rows: F.rows[..m].to_vec(), width: F.width };
                 factor.solve_block(&mut inner);
