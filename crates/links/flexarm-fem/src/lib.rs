@@ -68,6 +68,7 @@ pub mod sparse;
 pub mod spelling;
 pub mod stress;
 #[cfg(test)]
+#[path = "../tests/common/test_mesh.rs"]
 pub(crate) mod test_mesh;
 pub mod units;
 

@@ -6,6 +6,8 @@
 #![allow(clippy::unwrap_used, reason = "a test stops at the first failure")]
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 
+use flexarm_fem::{element, mesh}; // of the meshes that unit tests use too
+
 mod closed_forms;
 mod common;
 mod flex_file;
@@ -13,4 +15,5 @@ mod gate;
 mod mesh_select;
 mod modal;
 mod open_sections;
+mod reduction;
 mod split;

@@ -18,8 +18,6 @@ mod boundary;
 mod condensation;
 mod grounding;
 mod superelement;
-#[cfg(test)]
-mod tests;
 
 pub use boundary::{Boundary, Interface, Tie, TieError};
 pub use condensation::{Condensation, CondensationOptions, ReductionError, SolverFigures};

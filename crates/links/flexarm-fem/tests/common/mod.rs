@@ -1,6 +1,8 @@
 //! Strategies and sample links shared by the tests.
 #![allow(dead_code, reason = "each test binary uses its own part of this module")]
 
+pub(crate) mod test_mesh;
+
 use flexarm_fem::{BeamLink, BeamTheory, LinkFrames, Material, Pose, ReducedLink, Section};
 use nalgebra::{Matrix6, Rotation3, Translation3, Vector3, Vector6};
 use proptest::prelude::*;

@@ -2,9 +2,9 @@
 //! one interface, no mass.
 
 use super::*;
-use crate::matrix_link::reduce_matrices;
-use crate::mesh_link::MeshLinkError;
-use crate::sparse::{Modes, ModesError, SparseSymmetric};
+use flexarm_fem::matrix_link::reduce_matrices;
+use flexarm_fem::mesh_link::MeshLinkError;
+use flexarm_fem::sparse::{Modes, ModesError, SparseSymmetric};
 
 fn model_of(mesh: &Mesh) -> FeModel {
     FeModel::assemble(mesh, &AssemblyOptions { material: Some(STEEL), ..Default::default() }).unwrap()
