@@ -8,7 +8,7 @@ use std::ptr;
 use flexarm::settings::Words;
 use flexarm::{DriveModel, LinkModel, Modelling};
 
-use super::{NULL, array, get_each, guarded, message, set_each, string, string_or_null, text_of};
+use super::{Logger, NULL, array, free, get_each, guarded, logged, message, set_each, string, string_or_null, text_of};
 use crate::error::FmuError;
 use crate::model::{FmuModel, FmuSettings, FmuState};
 use crate::variables::{Causality, Kind};
@@ -29,6 +29,15 @@ fn failed(text: &str) {
     ERROR.with(|error| *error.borrow_mut() = message(text));
 }
 
+/// Keeps messages for [`flexarm_error`].
+struct Last;
+
+impl Logger for Last {
+    fn write(&self, text: &str) {
+        failed(text);
+    }
+}
+
 /// Runs a function; returns 0, or -1 after keeping the message.
 ///
 /// # Safety
@@ -39,17 +48,18 @@ unsafe fn call(plant: *mut Handle, work: impl FnOnce(&mut Handle) -> Result<(), 
         failed("the plant is a null pointer");
         return -1;
     };
-    match guarded(|| work(plant)) {
-        Some(Ok(())) => 0,
-        Some(Err(error)) => {
-            failed(&text_of(&error));
-            -1
+    logged(&Last, || work(plant)).map_or(-1, |()| 0)
+}
+
+/// Writes functions of a plant: their arguments, and what is done with the plant.
+macro_rules! plant_functions {
+    ($($name:ident($($argument:ident: $type:ty),*) = $work:expr;)*) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(plant: *mut Handle $(, $argument: $type)*) -> c_int {
+            // SAFETY: the caller passes a plant, a state of it and arrays of this length, or null.
+            unsafe { call(plant, $work) }
         }
-        None => {
-            failed("the library failed; please report it");
-            -1
-        }
-    }
+    )*};
 }
 
 #[unsafe(no_mangle)]
@@ -128,11 +138,8 @@ unsafe fn opened(
 
 #[unsafe(no_mangle)]
 extern "C" fn flexarm_free(plant: *mut Handle) {
-    if !plant.is_null() {
-        // SAFETY: the caller frees a plant once.
-        let plant = unsafe { Box::from_raw(plant) };
-        guarded(|| drop(plant));
-    }
+    // SAFETY: the caller frees a plant once.
+    unsafe { free(plant) }
 }
 
 #[unsafe(no_mangle)]
@@ -184,71 +191,42 @@ extern "C" fn flexarm_causality(plant: *const Handle, reference: u32) -> c_int {
     }
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn flexarm_set(plant: *mut Handle, references: *const u32, values: *const f64, n: usize) -> c_int {
-    // SAFETY: the caller passes a plant and arrays of this length, or null.
-    unsafe {
-        call(plant, |handle| {
-            set_each(references, values, n, |reference, value| {
-                let reference = reference as usize;
-                match handle.plant.variables().get(reference).map(|variable| variable.kind) {
-                    Some(Kind::Boolean) if value == 0.0 || value == 1.0 => {
-                        handle.plant.set_flag(reference, value == 1.0)
-                    }
-                    Some(Kind::Boolean) => {
-                        let name = handle.plant.variables()[reference].name.clone();
-                        Err(FmuError::Value { name, found: value, expected: "0 or 1" })
-                    }
-                    _ => handle.plant.set(reference, value),
+plant_functions! {
+    flexarm_set(references: *const u32, values: *const f64, n: usize) = |handle| {
+        set_each(references, values, n, |reference, value| {
+            let reference = reference as usize;
+            match handle.plant.variables().get(reference).map(|variable| variable.kind) {
+                Some(Kind::Boolean) if value == 0.0 || value == 1.0 => handle.plant.set_flag(reference, value == 1.0),
+                Some(Kind::Boolean) => {
+                    let name = handle.plant.variables()[reference].name.clone();
+                    Err(FmuError::Value { name, found: value, expected: "0 or 1" })
                 }
-            })
+                _ => handle.plant.set(reference, value),
+            }
         })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn flexarm_get(plant: *mut Handle, references: *const u32, values: *mut f64, n: usize) -> c_int {
-    // SAFETY: the caller passes a plant and arrays of this length, or null.
-    unsafe {
-        call(plant, |handle| {
-            get_each(references, values, n, |reference| {
-                let reference = reference as usize;
-                match handle.plant.variables().get(reference).map(|variable| variable.kind) {
-                    Some(Kind::Boolean) => handle.plant.get_flag(reference).map(f64::from),
-                    _ => handle.plant.get(reference),
-                }
-            })
+    };
+    flexarm_get(references: *const u32, values: *mut f64, n: usize) = |handle| {
+        get_each(references, values, n, |reference| {
+            let reference = reference as usize;
+            match handle.plant.variables().get(reference).map(|variable| variable.kind) {
+                Some(Kind::Boolean) => handle.plant.get_flag(reference).map(f64::from),
+                _ => handle.plant.get(reference),
+            }
         })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn flexarm_start(plant: *mut Handle, begin_s: f64) -> c_int {
-    // SAFETY: the caller passes a plant or null.
-    unsafe { call(plant, |handle| handle.plant.start(begin_s)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn flexarm_step(plant: *mut Handle, length_s: f64) -> c_int {
-    // SAFETY: the caller passes a plant or null.
-    unsafe { call(plant, |handle| handle.plant.step(handle.plant.time_s(), length_s)) }
+    };
+    flexarm_start(begin_s: f64) = |handle| handle.plant.start(begin_s);
+    flexarm_step(length_s: f64) = |handle| handle.plant.step(handle.plant.time_s(), length_s);
+    flexarm_reset() = |handle| {
+        handle.plant.reset();
+        Ok(())
+    };
+    flexarm_restore(state: *const FmuState) = |handle| handle.plant.restore(state.as_ref().ok_or(NULL)?);
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn flexarm_time(plant: *const Handle) -> f64 {
     // SAFETY: the caller passes a plant or null.
     unsafe { plant.as_ref() }.map_or(f64::NAN, |handle| handle.plant.time_s())
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn flexarm_reset(plant: *mut Handle) -> c_int {
-    // SAFETY: the caller passes a plant or null.
-    unsafe {
-        call(plant, |handle| {
-            handle.plant.reset();
-            Ok(())
-        })
-    }
 }
 
 #[unsafe(no_mangle)]
@@ -265,18 +243,9 @@ extern "C" fn flexarm_state(plant: *mut Handle) -> *mut FmuState {
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn flexarm_restore(plant: *mut Handle, state: *const FmuState) -> c_int {
-    // SAFETY: the caller passes a plant and a state of it, or null.
-    unsafe { call(plant, |handle| handle.plant.restore(state.as_ref().ok_or(NULL)?)) }
-}
-
-#[unsafe(no_mangle)]
 extern "C" fn flexarm_free_state(state: *mut FmuState) {
-    if !state.is_null() {
-        // SAFETY: the caller frees a state once.
-        let state = unsafe { Box::from_raw(state) };
-        guarded(|| drop(state));
-    }
+    // SAFETY: the caller frees a state once.
+    unsafe { free(state) }
 }
 
 #[cfg(test)]

@@ -5,15 +5,13 @@ use std::path::PathBuf;
 use std::ptr;
 
 use super::{
-    Differential, NULL, array, free_state, get_each, guarded, message, put_state, put_states, set_each, string, text_of,
+    Component, Differential, ERROR, Logger, NULL, Status, array, call, free, free_state, get_each, instantiated,
+    message, put_state, put_states, set_each, string,
 };
 use crate::error::FmuError;
 use crate::instance::{Instance, InstanceState, Interface, StateValues};
 
-type Status = c_int;
-const OK: Status = 0;
 const DISCARD: Status = 2;
-const ERROR: Status = 3;
 /// `fmi2ModelExchange`.
 const MODEL_EXCHANGE: c_int = 0;
 /// `fmi2CoSimulation`.
@@ -21,32 +19,26 @@ const CO_SIMULATION: c_int = 1;
 /// `fmi2LastSuccessfulTime`.
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 
-type Logger = Option<unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...)>;
+type LogMessage = Option<unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...)>;
 
 /// `fmi2CallbackFunctions`.
 #[repr(C)]
 struct Callbacks {
-    logger: Logger,
+    logger: LogMessage,
     allocate: *const c_void,
     free: *const c_void,
     step_finished: *const c_void,
     environment: *mut c_void,
 }
 
-/// An instance with its logger.
-struct Component {
-    instance: Instance,
-    log: Log,
-}
-
 /// Logger with what it is called with.
 struct Log {
-    logger: Logger,
+    logger: LogMessage,
     environment: *mut c_void,
     name: CString,
 }
 
-impl Log {
+impl Logger for Log {
     fn write(&self, text: &str) {
         if let Some(logger) = self.logger {
             let text = message(text);
@@ -60,38 +52,6 @@ impl Log {
     }
 }
 
-/// Runs a function of an instance.
-///
-/// # Safety
-/// `component` is null or an instance that is not freed.
-unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), FmuError>) -> Status {
-    // SAFETY: as promised by the caller.
-    let Some(component) = (unsafe { component.cast::<Component>().as_mut() }) else { return ERROR };
-    match guarded(|| work(&mut component.instance)) {
-        Some(Ok(())) => OK,
-        Some(Err(error)) => {
-            component.log.write(&text_of(&error));
-            ERROR
-        }
-        None => {
-            component.log.write("the library failed; please report it");
-            ERROR
-        }
-    }
-}
-
-/// Writes functions that this kind of FMU does not have: they return an error.
-macro_rules! without {
-    ($($name:ident($($argument:ty),*);)*) => {$(
-        #[unsafe(no_mangle)]
-        extern "C" fn $name(component: *mut c_void $(, _: $argument)*) -> Status {
-            let missing = FmuError::Order { function: stringify!($name), phase: "of this FMU" };
-            // SAFETY: the importer passes an instance or null.
-            unsafe { call(component, |_| Err(missing)) }
-        }
-    )*};
-}
-
 #[unsafe(no_mangle)]
 extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
     c"default".as_ptr()
@@ -100,12 +60,6 @@ extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
 #[unsafe(no_mangle)]
 extern "C" fn fmi2GetVersion() -> *const c_char {
     c"2.0".as_ptr()
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetDebugLogging(component: *mut c_void, _: c_int, _: usize, _: *const *const c_char) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |_| Ok(())) }
 }
 
 /// Returns the folder of a `file:` address; other texts are taken as paths.
@@ -164,148 +118,18 @@ extern "C" fn fmi2Instantiate(
         log.write("GUID and location of the resources are needed as UTF-8");
         return ptr::null_mut();
     };
-    match guarded(|| Instance::new(&folder(location), guid, interface)) {
-        Some(Ok(instance)) => Box::into_raw(Box::new(Component { instance, log })).cast(),
-        Some(Err(error)) => {
-            log.write(&text_of(&error));
-            ptr::null_mut()
-        }
-        None => {
-            log.write("the library failed; please report it");
-            ptr::null_mut()
-        }
-    }
+    instantiated(log, || Instance::new(&folder(location), guid, interface))
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi2FreeInstance(component: *mut c_void) {
-    if !component.is_null() {
-        // SAFETY: the importer frees an instance once.
-        let component = unsafe { Box::from_raw(component.cast::<Component>()) };
-        guarded(|| drop(component));
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetupExperiment(component: *mut c_void, _: c_int, _: f64, begin_s: f64, _: c_int, _: f64) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |instance| instance.set_begin(begin_s)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2EnterInitializationMode(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::enter_initialisation) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2ExitInitializationMode(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::exit_initialisation) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2Terminate(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::terminate) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2Reset(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe {
-        call(component, |instance| {
-            instance.reset();
-            Ok(())
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetReal(component: *mut c_void, references: *const c_uint, n: usize, values: *mut f64) -> Status {
-    // SAFETY: the importer passes an instance and arrays of this length, or null.
-    unsafe { call(component, |instance| get_each(references, values, n, |reference| instance.get(reference))) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetReal(component: *mut c_void, references: *const c_uint, n: usize, values: *const f64) -> Status {
-    // SAFETY: the importer passes an instance and arrays of this length, or null.
-    unsafe {
-        call(component, |instance| set_each(references, values, n, |reference, value| instance.set(reference, value)))
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetBoolean(
-    component: *mut c_void,
-    references: *const c_uint,
-    n: usize,
-    values: *mut c_int,
-) -> Status {
-    // SAFETY: the importer passes an instance and arrays of this length, or null.
-    unsafe {
-        call(component, |instance| {
-            get_each(references, values, n, |reference| Ok(instance.get_flag(reference)?.into()))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetBoolean(
-    component: *mut c_void,
-    references: *const c_uint,
-    n: usize,
-    values: *const c_int,
-) -> Status {
-    // SAFETY: the importer passes an instance and arrays of this length, or null.
-    unsafe {
-        call(component, |instance| {
-            set_each(references, values, n, |reference, value: c_int| instance.set_flag(reference, value != 0))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetFMUstate(component: *mut c_void, state: *mut *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance and a place for the state, or null.
-    unsafe { call(component, |instance| put_state(state, instance.state()?)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetFMUstate(component: *mut c_void, state: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance and a state of it, or null.
-    unsafe { call(component, |instance| instance.restore(state.cast::<InstanceState>().as_ref().ok_or(NULL)?)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2FreeFMUstate(component: *mut c_void, state: *mut *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance and a place with a state that is not freed, or null.
-    unsafe { call(component, |_| free_state(state)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2DoStep(component: *mut c_void, from_s: f64, length_s: f64, _no_return: c_int) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |instance| instance.step(from_s, length_s)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetRealStatus(component: *mut c_void, kind: c_int, value: *mut f64) -> Status {
-    // SAFETY: the importer passes an instance and a place for the value, or null.
-    unsafe {
-        call(component, |instance| {
-            let place = value.as_mut().ok_or(NULL)?;
-            match kind {
-                LAST_SUCCESSFUL_TIME => *place = instance.time_s(),
-                _ => return Err(FmuError::Order { function: "fmi2GetRealStatus", phase: "for this kind of status" }),
-            }
-            Ok(())
-        })
-    }
+    // SAFETY: the importer frees an instance once.
+    unsafe { free(component.cast::<Component<Log>>()) }
 }
 
 /// `fmi2EventInfo`.
 #[repr(C)]
+#[derive(Default)]
 struct EventInfo {
     again: c_int,
     terminate: c_int,
@@ -315,113 +139,75 @@ struct EventInfo {
     next_s: f64,
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2EnterEventMode(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::enter_event_mode) }
-}
+type Refs = *const c_uint;
+type Out<T> = *mut T;
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi2EnterContinuousTimeMode(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::enter_continuous_time_mode) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2NewDiscreteStates(component: *mut c_void, info: *mut EventInfo) -> Status {
-    // SAFETY: the importer passes an instance and a place for the answer, or null.
-    unsafe {
-        call(component, |instance| {
-            let (none, next_s) = (0, 0.0);
-            *info.as_mut().ok_or(NULL)? = EventInfo {
-                again: none,
-                terminate: none,
-                nominals_changed: none,
-                states_changed: none,
-                has_next: none,
-                next_s,
-            };
-            instance.update_discrete_states()
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2CompletedIntegratorStep(
-    component: *mut c_void,
-    _final: c_int,
-    event: *mut c_int,
-    terminate: *mut c_int,
-) -> Status {
-    // SAFETY: the importer passes an instance and places for the answers, or null.
-    unsafe {
-        call(component, |instance| {
-            if event.is_null() || terminate.is_null() {
-                return Err(NULL);
-            }
-            // Not as references: both may be the same place.
-            event.write(0);
-            terminate.write(0);
-            instance.complete_step()
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetTime(component: *mut c_void, time_s: f64) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |instance| instance.set_time(time_s)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2SetContinuousStates(component: *mut c_void, states: *const f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| instance.set_states(array(states, n).ok_or(NULL)?)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetContinuousStates(component: *mut c_void, states: *mut f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| put_states(instance, StateValues::States, states, n)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetDerivatives(component: *mut c_void, slopes: *mut f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| put_states(instance, StateValues::Derivatives, slopes, n)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetNominalsOfContinuousStates(component: *mut c_void, nominals: *mut f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| put_states(instance, StateValues::Nominals, nominals, n)) }
-}
-
-/// There are no event indicators.
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetEventIndicators(component: *mut c_void, _: *mut f64, _: usize) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |_| Ok(())) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi2GetDirectionalDerivative(
-    component: *mut c_void,
-    unknowns: *const c_uint,
-    n_unknowns: usize,
-    knowns: *const c_uint,
-    n_knowns: usize,
-    seed: *const f64,
-    result: *mut f64,
-) -> Status {
-    let own = Differential {
+functions! {
+    fmi2SetDebugLogging(_on: c_int, _n: usize, _categories: *const *const c_char) = |_| Ok(());
+    fmi2SetupExperiment(_has_tolerance: c_int, _tolerance: f64, begin_s: f64, _has_end: c_int, _end_s: f64) =
+        |instance| instance.set_begin(begin_s);
+    fmi2EnterInitializationMode() = Instance::enter_initialisation;
+    fmi2ExitInitializationMode() = Instance::exit_initialisation;
+    fmi2Terminate() = Instance::terminate;
+    fmi2Reset() = |instance| {
+        instance.reset();
+        Ok(())
+    };
+    fmi2GetReal(references: Refs, n: usize, values: Out<f64>) =
+        |instance| get_each(references, values, n, |reference| instance.get(reference));
+    fmi2SetReal(references: Refs, n: usize, values: *const f64) =
+        |instance| set_each(references, values, n, |reference, value| instance.set(reference, value));
+    fmi2GetBoolean(references: Refs, n: usize, values: Out<c_int>) =
+        |instance| get_each(references, values, n, |reference| Ok(instance.get_flag(reference)?.into()));
+    fmi2SetBoolean(references: Refs, n: usize, values: *const c_int) =
+        |instance| set_each(references, values, n, |reference, value| instance.set_flag(reference, value != 0));
+    fmi2GetFMUstate(state: Out<*mut c_void>) = |instance| put_state(state, instance.state()?);
+    fmi2SetFMUstate(state: *mut c_void) =
+        |instance| instance.restore(state.cast::<InstanceState>().as_ref().ok_or(NULL)?);
+    fmi2FreeFMUstate(state: Out<*mut c_void>) = |_| free_state(state);
+    fmi2DoStep(from_s: f64, length_s: f64, _no_return: c_int) = |instance| instance.step(from_s, length_s);
+    fmi2GetRealStatus(kind: c_int, value: Out<f64>) = |instance| {
+        let place = value.as_mut().ok_or(NULL)?;
+        if kind != LAST_SUCCESSFUL_TIME {
+            return Err(FmuError::Order { function: "fmi2GetRealStatus", phase: "for this kind of status" });
+        }
+        *place = instance.time_s();
+        Ok(())
+    };
+    fmi2EnterEventMode() = Instance::enter_event_mode;
+    fmi2EnterContinuousTimeMode() = Instance::enter_continuous_time_mode;
+    fmi2NewDiscreteStates(info: Out<EventInfo>) = |instance| {
+        *info.as_mut().ok_or(NULL)? = EventInfo::default();
+        instance.update_discrete_states()
+    };
+    fmi2CompletedIntegratorStep(_final: c_int, event: Out<c_int>, terminate: Out<c_int>) = |instance| {
+        if event.is_null() || terminate.is_null() {
+            return Err(NULL);
+        }
+        // Not as references: both may be the same place.
+        event.write(0);
+        terminate.write(0);
+        instance.complete_step()
+    };
+    fmi2SetTime(time_s: f64) = |instance| instance.set_time(time_s);
+    fmi2SetContinuousStates(states: *const f64, n: usize) =
+        |instance| instance.set_states(array(states, n).ok_or(NULL)?);
+    fmi2GetContinuousStates(states: Out<f64>, n: usize) =
+        |instance| put_states(instance, StateValues::States, states, n);
+    fmi2GetDerivatives(slopes: Out<f64>, n: usize) =
+        |instance| put_states(instance, StateValues::Derivatives, slopes, n);
+    fmi2GetNominalsOfContinuousStates(nominals: Out<f64>, n: usize) =
+        |instance| put_states(instance, StateValues::Nominals, nominals, n);
+    /// There are no event indicators.
+    fmi2GetEventIndicators(_indicators: Out<f64>, _n: usize) = |_| Ok(());
+    fmi2GetDirectionalDerivative(
+        unknowns: Refs, n_unknowns: usize, knowns: Refs, n_knowns: usize, seed: *const f64, result: Out<f64>
+    ) = |instance| Differential {
         unknowns: (unknowns, n_unknowns),
         knowns: (knowns, n_knowns),
         seed: (seed, n_knowns),
         result: (result, n_unknowns),
-    };
-    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
-    unsafe { call(component, |instance| own.compute(instance)) }
+    }.compute(instance);
 }
 
 /// Steps are never pending: no other status is known.
@@ -441,8 +227,6 @@ discarded! {
     fmi2GetStringStatus(*const c_char);
 }
 
-type Refs = *const c_uint;
-type Out<T> = *mut T;
 without! {
     fmi2GetInteger(Refs, usize, Out<c_int>);
     fmi2SetInteger(Refs, usize, *const c_int);

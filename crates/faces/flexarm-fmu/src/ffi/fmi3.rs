@@ -5,79 +5,31 @@ use std::path::Path;
 use std::ptr;
 
 use super::{
-    Differential, NULL, array, free_state, get_each, guarded, message, put_state, put_states, set_each, string, text_of,
+    Component, Differential, ERROR, Logger, NULL, Status, array, call, free, free_state, get_each, instantiated,
+    message, put_state, put_states, set_each, string,
 };
 use crate::error::FmuError;
 use crate::instance::{Instance, InstanceState, Interface, StateValues};
 
-type Status = c_int;
-const OK: Status = 0;
-const ERROR: Status = 3;
-
 type LogMessage = Option<unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char)>;
 
-/// An instance with its logger.
-struct Component {
-    instance: Instance,
-    environment: *mut c_void,
-    log: LogMessage,
-}
+/// Logger with what it is called with.
+struct Log(LogMessage, *mut c_void);
 
-impl Component {
-    fn log(&self, error: &FmuError) {
-        log(self.log, self.environment, &text_of(error));
-    }
-}
-
-fn log(log: LogMessage, environment: *mut c_void, text: &str) {
-    if let Some(log) = log {
-        let text = message(text);
-        // SAFETY: the importer gave logger and environment for each other.
-        unsafe { log(environment, ERROR, c"logStatusError".as_ptr(), text.as_ptr()) }
-    }
-}
-
-/// Runs a function of an instance.
-///
-/// # Safety
-/// `component` is null or an instance that is not freed.
-unsafe fn call(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), FmuError>) -> Status {
-    // SAFETY: as promised by the caller.
-    let Some(component) = (unsafe { component.cast::<Component>().as_mut() }) else { return ERROR };
-    match guarded(|| work(&mut component.instance)) {
-        Some(Ok(())) => OK,
-        Some(Err(error)) => {
-            component.log(&error);
-            ERROR
-        }
-        None => {
-            log(component.log, component.environment, "the library failed; please report it");
-            ERROR
+impl Logger for Log {
+    fn write(&self, text: &str) {
+        let Self(logger, environment) = *self;
+        if let Some(log) = logger {
+            let text = message(text);
+            // SAFETY: the importer gave logger and environment for each other.
+            unsafe { log(environment, ERROR, c"logStatusError".as_ptr(), text.as_ptr()) }
         }
     }
-}
-
-/// Writes functions that this kind of FMU does not have: they return an error.
-macro_rules! without {
-    ($($name:ident($($argument:ty),*);)*) => {$(
-        #[unsafe(no_mangle)]
-        extern "C" fn $name(component: *mut c_void $(, _: $argument)*) -> Status {
-            let missing = FmuError::Order { function: stringify!($name), phase: "of this FMU" };
-            // SAFETY: the importer passes an instance or null.
-            unsafe { call(component, |_| Err(missing)) }
-        }
-    )*};
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi3GetVersion() -> *const c_char {
     c"3.0".as_ptr()
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SetDebugLogging(component: *mut c_void, _: bool, _: usize, _: *const *const c_char) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |_| Ok(())) }
 }
 
 #[unsafe(no_mangle)]
@@ -91,7 +43,7 @@ extern "C" fn fmi3InstantiateModelExchange(
     logger: LogMessage,
 ) -> *mut c_void {
     // SAFETY: the importer passes strings or null.
-    unsafe { instantiated([token, resources], Interface::ModelExchange, environment, logger) }
+    unsafe { opened([token, resources], Interface::ModelExchange, Log(logger, environment)) }
 }
 
 #[unsafe(no_mangle)]
@@ -107,7 +59,7 @@ extern "C" fn fmi3InstantiateScheduledExecution(
     _: *const c_void,
     _: *const c_void,
 ) -> *mut c_void {
-    log(logger, environment, "this FMU is for co-simulation and model exchange");
+    Log(logger, environment).write("this FMU is for co-simulation and model exchange");
     ptr::null_mut()
 }
 
@@ -115,29 +67,13 @@ extern "C" fn fmi3InstantiateScheduledExecution(
 ///
 /// # Safety
 /// Token and path of the resources are null or end with zero.
-unsafe fn instantiated(
-    [token, resources]: [*const c_char; 2],
-    interface: Interface,
-    environment: *mut c_void,
-    logger: LogMessage,
-) -> *mut c_void {
+unsafe fn opened([token, resources]: [*const c_char; 2], interface: Interface, log: Log) -> *mut c_void {
     // SAFETY: as promised by the caller.
-    let (token, resources) = unsafe { (string(token), string(resources)) };
-    let (Some(token), Some(resources)) = (token, resources) else {
-        log(logger, environment, "token and path of the resources are needed as UTF-8");
+    let (Some(token), Some(resources)) = (unsafe { (string(token), string(resources)) }) else {
+        log.write("token and path of the resources are needed as UTF-8");
         return ptr::null_mut();
     };
-    match guarded(|| Instance::new(Path::new(resources), token, interface)) {
-        Some(Ok(instance)) => Box::into_raw(Box::new(Component { instance, environment, log: logger })).cast(),
-        Some(Err(error)) => {
-            log(logger, environment, &text_of(&error));
-            ptr::null_mut()
-        }
-        None => {
-            log(logger, environment, "the library failed; please report it");
-            ptr::null_mut()
-        }
-    }
+    instantiated(log, || Instance::new(Path::new(resources), token, interface))
 }
 
 #[unsafe(no_mangle)]
@@ -156,129 +92,108 @@ extern "C" fn fmi3InstantiateCoSimulation(
     _update: *const c_void,
 ) -> *mut c_void {
     if n_intermediate > 0 {
-        log(logger, environment, "this FMU has no intermediate update");
+        Log(logger, environment).write("this FMU has no intermediate update");
         return ptr::null_mut();
     }
     // SAFETY: the importer passes strings or null.
-    unsafe { instantiated([token, resources], Interface::CoSimulation, environment, logger) }
+    unsafe { opened([token, resources], Interface::CoSimulation, Log(logger, environment)) }
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn fmi3FreeInstance(component: *mut c_void) {
-    if !component.is_null() {
-        // SAFETY: the importer frees an instance once.
-        let component = unsafe { Box::from_raw(component.cast::<Component>()) };
-        guarded(|| drop(component));
-    }
+    // SAFETY: the importer frees an instance once.
+    unsafe { free(component.cast::<Component<Log>>()) }
 }
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi3EnterInitializationMode(
-    component: *mut c_void,
-    _: bool,
-    _: f64,
-    begin_s: f64,
-    _: bool,
-    _: f64,
-) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe {
-        call(component, |instance| {
-            instance.set_begin(begin_s)?;
-            instance.enter_initialisation()
-        })
-    }
-}
+type Refs = *const u32;
+type Out<T> = *mut T;
 
-#[unsafe(no_mangle)]
-extern "C" fn fmi3ExitInitializationMode(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::exit_initialisation) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3Terminate(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::terminate) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3Reset(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe {
-        call(component, |instance| {
-            instance.reset();
-            Ok(())
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetFloat64(
-    component: *mut c_void,
-    references: *const u32,
-    n: usize,
-    values: *mut f64,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
-    unsafe {
-        call(component, |instance| {
-            lengths(n, n_values)?;
-            get_each(references, values, n, |reference| instance.get(reference))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SetFloat64(
-    component: *mut c_void,
-    references: *const u32,
-    n: usize,
-    values: *const f64,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
-    unsafe {
-        call(component, |instance| {
-            lengths(n, n_values)?;
-            set_each(references, values, n, |reference, value| instance.set(reference, value))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetBoolean(
-    component: *mut c_void,
-    references: *const u32,
-    n: usize,
-    values: *mut bool,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
-    unsafe {
-        call(component, |instance| {
-            lengths(n, n_values)?;
-            get_each(references, values, n, |reference| instance.get_flag(reference))
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SetBoolean(
-    component: *mut c_void,
-    references: *const u32,
-    n: usize,
-    values: *const bool,
-    n_values: usize,
-) -> Status {
-    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
-    unsafe {
-        call(component, |instance| {
-            lengths(n, n_values)?;
-            set_each(references, values, n, |reference, value| instance.set_flag(reference, value))
-        })
-    }
+functions! {
+    fmi3SetDebugLogging(_on: bool, _n: usize, _categories: *const *const c_char) = |_| Ok(());
+    fmi3EnterInitializationMode(
+        _has_tolerance: bool, _tolerance: f64, begin_s: f64, _has_end: bool, _end_s: f64
+    ) = |instance| {
+        instance.set_begin(begin_s)?;
+        instance.enter_initialisation()
+    };
+    fmi3ExitInitializationMode() = Instance::exit_initialisation;
+    fmi3Terminate() = Instance::terminate;
+    fmi3Reset() = |instance| {
+        instance.reset();
+        Ok(())
+    };
+    fmi3GetFloat64(references: Refs, n: usize, values: Out<f64>, n_values: usize) = |instance| {
+        lengths(n, n_values)?;
+        get_each(references, values, n, |reference| instance.get(reference))
+    };
+    fmi3SetFloat64(references: Refs, n: usize, values: *const f64, n_values: usize) = |instance| {
+        lengths(n, n_values)?;
+        set_each(references, values, n, |reference, value| instance.set(reference, value))
+    };
+    fmi3GetBoolean(references: Refs, n: usize, values: Out<bool>, n_values: usize) = |instance| {
+        lengths(n, n_values)?;
+        get_each(references, values, n, |reference| instance.get_flag(reference))
+    };
+    fmi3SetBoolean(references: Refs, n: usize, values: *const bool, n_values: usize) = |instance| {
+        lengths(n, n_values)?;
+        set_each(references, values, n, |reference, value| instance.set_flag(reference, value))
+    };
+    fmi3GetFMUState(state: Out<*mut c_void>) = |instance| put_state(state, instance.state()?);
+    fmi3SetFMUState(state: *mut c_void) =
+        |instance| instance.restore(state.cast::<InstanceState>().as_ref().ok_or(NULL)?);
+    fmi3FreeFMUState(state: Out<*mut c_void>) = |_| free_state(state);
+    fmi3DoStep(
+        from_s: f64, length_s: f64, _no_return: bool,
+        event: Out<bool>, terminate: Out<bool>, early: Out<bool>, last_s: Out<f64>
+    ) = |instance| {
+        lower([event, terminate, early]);
+        let done = instance.step(from_s, length_s);
+        if let Some(last_s) = last_s.as_mut() {
+            *last_s = instance.time_s();
+        }
+        done
+    };
+    fmi3EnterEventMode() = Instance::enter_event_mode;
+    fmi3EnterContinuousTimeMode() = Instance::enter_continuous_time_mode;
+    fmi3UpdateDiscreteStates(
+        again: Out<bool>, terminate: Out<bool>, nominals_changed: Out<bool>, states_changed: Out<bool>,
+        has_next: Out<bool>, _next_s: Out<f64>
+    ) = |instance| {
+        lower([again, terminate, nominals_changed, states_changed, has_next]);
+        instance.update_discrete_states()
+    };
+    fmi3CompletedIntegratorStep(_final: bool, event: Out<bool>, terminate: Out<bool>) = |instance| {
+        lower([event, terminate]);
+        instance.complete_step()
+    };
+    fmi3SetTime(time_s: f64) = |instance| instance.set_time(time_s);
+    fmi3SetContinuousStates(states: *const f64, n: usize) =
+        |instance| instance.set_states(array(states, n).ok_or(NULL)?);
+    fmi3GetContinuousStates(states: Out<f64>, n: usize) =
+        |instance| put_states(instance, StateValues::States, states, n);
+    fmi3GetContinuousStateDerivatives(slopes: Out<f64>, n: usize) =
+        |instance| put_states(instance, StateValues::Derivatives, slopes, n);
+    fmi3GetNominalsOfContinuousStates(nominals: Out<f64>, n: usize) =
+        |instance| put_states(instance, StateValues::Nominals, nominals, n);
+    fmi3GetNumberOfContinuousStates(count: Out<usize>) = |instance| {
+        *count.as_mut().ok_or(NULL)? = instance.n_states();
+        Ok(())
+    };
+    fmi3GetNumberOfEventIndicators(count: Out<usize>) = |_| {
+        *count.as_mut().ok_or(NULL)? = 0;
+        Ok(())
+    };
+    /// There are no event indicators.
+    fmi3GetEventIndicators(_indicators: Out<f64>, _n: usize) = |_| Ok(());
+    fmi3GetDirectionalDerivative(
+        unknowns: Refs, n_unknowns: usize, knowns: Refs, n_knowns: usize,
+        seed: *const f64, n_seed: usize, result: Out<f64>, n_result: usize
+    ) = |instance| Differential {
+        unknowns: (unknowns, n_unknowns),
+        knowns: (knowns, n_knowns),
+        seed: (seed, n_seed),
+        result: (result, n_result),
+    }.compute(instance);
 }
 
 /// Checks that there is a value for each reference; all variables are scalars.
@@ -287,172 +202,6 @@ fn lengths(references: usize, values: usize) -> Result<(), FmuError> {
         true => Ok(()),
         false => Err(FmuError::Order { function: "a getter or setter", phase: "with another number of values" }),
     }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetFMUState(component: *mut c_void, state: *mut *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance and a place for the state, or null.
-    unsafe { call(component, |instance| put_state(state, instance.state()?)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SetFMUState(component: *mut c_void, state: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance and a state of it, or null.
-    unsafe { call(component, |instance| instance.restore(state.cast::<InstanceState>().as_ref().ok_or(NULL)?)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3FreeFMUState(component: *mut c_void, state: *mut *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance and a place with a state that is not freed, or null.
-    unsafe { call(component, |_| free_state(state)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3DoStep(
-    component: *mut c_void,
-    from_s: f64,
-    length_s: f64,
-    _no_return: bool,
-    event: *mut bool,
-    terminate: *mut bool,
-    early: *mut bool,
-    last_s: *mut f64,
-) -> Status {
-    // SAFETY: the importer passes an instance and places for the answers, or null.
-    unsafe {
-        lower([event, terminate, early]);
-        call(component, |instance| {
-            let done = instance.step(from_s, length_s);
-            if let Some(last_s) = last_s.as_mut() {
-                *last_s = instance.time_s();
-            }
-            done
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3EnterEventMode(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::enter_event_mode) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3EnterContinuousTimeMode(component: *mut c_void) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, Instance::enter_continuous_time_mode) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3UpdateDiscreteStates(
-    component: *mut c_void,
-    again: *mut bool,
-    terminate: *mut bool,
-    nominals_changed: *mut bool,
-    states_changed: *mut bool,
-    has_next: *mut bool,
-    _next_s: *mut f64,
-) -> Status {
-    // SAFETY: the importer passes an instance and places for the answers, or null.
-    unsafe {
-        lower([again, terminate, nominals_changed, states_changed, has_next]);
-        call(component, Instance::update_discrete_states)
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3CompletedIntegratorStep(
-    component: *mut c_void,
-    _final: bool,
-    event: *mut bool,
-    terminate: *mut bool,
-) -> Status {
-    // SAFETY: the importer passes an instance and places for the answers, or null.
-    unsafe {
-        lower([event, terminate]);
-        call(component, Instance::complete_step)
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SetTime(component: *mut c_void, time_s: f64) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |instance| instance.set_time(time_s)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3SetContinuousStates(component: *mut c_void, states: *const f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| instance.set_states(array(states, n).ok_or(NULL)?)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetContinuousStates(component: *mut c_void, states: *mut f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| put_states(instance, StateValues::States, states, n)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetContinuousStateDerivatives(component: *mut c_void, slopes: *mut f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| put_states(instance, StateValues::Derivatives, slopes, n)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetNominalsOfContinuousStates(component: *mut c_void, nominals: *mut f64, n: usize) -> Status {
-    // SAFETY: the importer passes an instance and an array of this length, or null.
-    unsafe { call(component, |instance| put_states(instance, StateValues::Nominals, nominals, n)) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetNumberOfContinuousStates(component: *mut c_void, count: *mut usize) -> Status {
-    // SAFETY: the importer passes an instance and a place for the number, or null.
-    unsafe {
-        call(component, |instance| {
-            *count.as_mut().ok_or(NULL)? = instance.n_states();
-            Ok(())
-        })
-    }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetNumberOfEventIndicators(component: *mut c_void, count: *mut usize) -> Status {
-    // SAFETY: the importer passes an instance and a place for the number, or null.
-    unsafe {
-        call(component, |_| {
-            *count.as_mut().ok_or(NULL)? = 0;
-            Ok(())
-        })
-    }
-}
-
-/// There are no event indicators.
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetEventIndicators(component: *mut c_void, _: *mut f64, _: usize) -> Status {
-    // SAFETY: the importer passes an instance or null.
-    unsafe { call(component, |_| Ok(())) }
-}
-
-#[unsafe(no_mangle)]
-extern "C" fn fmi3GetDirectionalDerivative(
-    component: *mut c_void,
-    unknowns: *const u32,
-    n_unknowns: usize,
-    knowns: *const u32,
-    n_knowns: usize,
-    seed: *const f64,
-    n_seed: usize,
-    result: *mut f64,
-    n_result: usize,
-) -> Status {
-    let own = Differential {
-        unknowns: (unknowns, n_unknowns),
-        knowns: (knowns, n_knowns),
-        seed: (seed, n_seed),
-        result: (result, n_result),
-    };
-    // SAFETY: the importer passes an instance and arrays of these lengths, or null.
-    unsafe { call(component, |instance| own.compute(instance)) }
 }
 
 /// Writes "false" to every place that is there.
@@ -468,8 +217,6 @@ unsafe fn lower<const N: usize>(places: [*mut bool; N]) {
     }
 }
 
-type Refs = *const u32;
-type Out<T> = *mut T;
 without! {
     fmi3EnterStepMode();
     fmi3EnterConfigurationMode();

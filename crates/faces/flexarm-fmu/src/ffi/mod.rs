@@ -4,19 +4,101 @@
 //! undefined; no panic crosses the border; arrays have at least the given lengths, strings end with
 //! zero, and objects are those that this library returned and that are not freed yet.
 
+/// Writes functions of FMI: the arguments after the instance, and what is done with the instance.
+macro_rules! functions {
+    ($($(#[$doc:meta])* $name:ident($($argument:ident: $type:ty),*) = $work:expr;)*) => {$(
+        $(#[$doc])*
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(component: *mut c_void $(, $argument: $type)*) -> Status {
+            // SAFETY: the importer passes an instance, and places and arrays of the given lengths, or
+            // null.
+            unsafe { call::<Log>(component, $work) }
+        }
+    )*};
+}
+
+/// Writes functions that this kind of FMU does not have: they return an error.
+macro_rules! without {
+    ($($name:ident($($argument:ty),*);)*) => {$(
+        #[unsafe(no_mangle)]
+        extern "C" fn $name(component: *mut c_void $(, _: $argument)*) -> Status {
+            let missing = FmuError::Order { function: stringify!($name), phase: "of this FMU" };
+            // SAFETY: the importer passes an instance or null.
+            unsafe { call::<Log>(component, |_| Err(missing)) }
+        }
+    )*};
+}
+
 mod c;
 pub(crate) mod fmi2;
 mod fmi3;
 
-use std::ffi::{CStr, CString, c_char, c_void};
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr;
 use std::str::Utf8Error;
 
 use crate::error::FmuError;
 use crate::instance::{Instance, InstanceState, StateValues};
 
+/// Status of FMI.
+type Status = c_int;
+const OK: Status = 0;
+const ERROR: Status = 3;
+
 /// Error for a null pointer where an object or an array is needed.
 const NULL: FmuError = FmuError::Order { function: "a function", phase: "with a null pointer" };
+
+/// Receiver of messages.
+trait Logger {
+    fn write(&self, text: &str);
+}
+
+/// An instance with the logger of its importer.
+struct Component<L> {
+    instance: Instance,
+    log: L,
+}
+
+/// Returns a new instance for the importer, or null after a message.
+fn instantiated<L: Logger>(log: L, make: impl FnOnce() -> Result<Instance, FmuError>) -> *mut c_void {
+    match logged(&log, make) {
+        Some(instance) => Box::into_raw(Box::new(Component { instance, log })).cast(),
+        None => ptr::null_mut(),
+    }
+}
+
+/// Frees an object.
+///
+/// # Safety
+/// `object` is null or an object that is not freed.
+unsafe fn free<T>(object: *mut T) {
+    if !object.is_null() {
+        // SAFETY: as promised by the caller.
+        let object = unsafe { Box::from_raw(object) };
+        guarded(|| drop(object));
+    }
+}
+
+/// Runs a function of an instance.
+///
+/// # Safety
+/// `component` is null or an instance with this logger that is not freed.
+unsafe fn call<L: Logger>(component: *mut c_void, work: impl FnOnce(&mut Instance) -> Result<(), FmuError>) -> Status {
+    // SAFETY: as promised by the caller.
+    let Some(component) = (unsafe { component.cast::<Component<L>>().as_mut() }) else { return ERROR };
+    logged(&component.log, || work(&mut component.instance)).map_or(ERROR, |()| OK)
+}
+
+/// Runs a function; writes its error, or that it panicked.
+fn logged<T>(log: &impl Logger, work: impl FnOnce() -> Result<T, FmuError>) -> Option<T> {
+    match guarded(work) {
+        Some(Ok(done)) => return Some(done),
+        Some(Err(error)) => log.write(&text_of(&error)),
+        None => log.write("the library failed; please report it"),
+    }
+    None
+}
 
 /// Runs a function; a panic becomes `None`.
 fn guarded<T>(work: impl FnOnce() -> T) -> Option<T> {
@@ -159,7 +241,7 @@ unsafe fn free_state(place: *mut *mut c_void) -> Result<(), FmuError> {
     if let Some(place) = unsafe { place.as_mut() }.filter(|place| !place.is_null()) {
         // SAFETY: as promised by the caller.
         drop(unsafe { Box::from_raw(place.cast::<InstanceState>()) });
-        *place = std::ptr::null_mut();
+        *place = ptr::null_mut();
     }
     Ok(())
 }
