@@ -175,12 +175,6 @@ macro_rules! lanes {
             }
 
             #[inline(always)]
-            fn flat_mut(all: &mut [Self]) -> &mut [f64] {
-                // SAFETY: as in `flat`; every bit pattern is a valid number.
-                unsafe { std::slice::from_raw_parts_mut(all.as_mut_ptr().cast(), $lanes * all.len()) }
-            }
-
-            #[inline(always)]
             fn load(from: &[f64]) -> Self {
                 let mut lanes = [0.0; $lanes];
                 lanes.copy_from_slice(&from[..$lanes]);

@@ -51,9 +51,6 @@ pub trait Real:
     /// Numbers lane by lane: those of entry i begin at `i LANES`.
     fn flat(all: &[Self]) -> &[f64];
 
-    /// Mutable view, laid out as [`Real::flat`].
-    fn flat_mut(all: &mut [Self]) -> &mut [f64];
-
     /// Loads the first numbers of a slice, one per lane.
     fn load(from: &[f64]) -> Self;
 
@@ -252,11 +249,6 @@ impl Real for f64 {
 
     #[inline(always)]
     fn flat(all: &[Self]) -> &[f64] {
-        all
-    }
-
-    #[inline(always)]
-    fn flat_mut(all: &mut [Self]) -> &mut [f64] {
         all
     }
 

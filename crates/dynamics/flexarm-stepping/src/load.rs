@@ -54,12 +54,6 @@ impl TimedWrench {
         Self { jumps, ..self }
     }
 
-    /// Returns the wrench with these additional times at which steps of fixed size end (s).
-    #[must_use]
-    pub fn with_stops(self, stops: Vec<f64>) -> Self {
-        Self { stops, ..self }
-    }
-
     /// Returns the wrench with this shortest period (s).
     #[must_use]
     pub fn with_period(self, period: f64) -> Self {

@@ -13,6 +13,7 @@ use crate::args::{ModellingArgs, RobotArgs, word_of};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::motion::MotionInputArgs;
+use crate::print::file_lines;
 use crate::shipped;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json, working};
@@ -257,10 +258,6 @@ fn text(found: &Compensation) -> String {
         );
         program.files.iter().for_each(|file| out += &format!("program  {file}\n"));
     }
-    for (what, file) in [("motion", &found.file), ("view", &found.recording), ("page", &found.page)] {
-        if let Some(file) = file {
-            out += &format!("{what:<8} {file}\n");
-        }
-    }
+    out += &file_lines(8, &[("motion", &found.file), ("view", &found.recording), ("page", &found.page)]);
     out
 }

@@ -6,9 +6,8 @@ use clap::Args;
 
 use crate::args::{ModellingArgs, RobotArgs, word_of};
 use flexarm::links::export::ExportFormat;
-use flexarm::links::import::{
-    FrameAt, ImportFormat, ImportMap, RigidPart, Split, UnitsOfFile, parse_part, parse_split,
-};
+use flexarm::links::import::{FrameAt, ImportFormat, ImportMap, RigidPart, UnitsOfFile, parse_part};
+use flexarm::links::reduce::SplitChoice;
 use flexarm::robots::RobotFormat;
 
 const IMPORT_EXAMPLES: &str = "\
@@ -104,8 +103,14 @@ pub(crate) struct ImportArgs {
     pub(crate) part_b: Option<RigidPart>,
     /// Position of the elastic joint between the two parts: elastic-centre, mid, a fraction of the
     /// distance from A to B, or x,y,z
-    #[arg(long, value_name = "WHERE", value_parser = parse_split, allow_hyphen_values = true, help_heading = "Mass of the link", hide_short_help = true)]
-    pub(crate) split: Option<Split>,
+    #[arg(
+        long,
+        value_name = "WHERE",
+        allow_hyphen_values = true,
+        help_heading = "Mass of the link",
+        hide_short_help = true
+    )]
+    pub(crate) split: Option<SplitChoice>,
     /// Name of the link [default: that of the file]
     #[arg(long, value_name = "NAME", help_heading = "Files")]
     pub(crate) name: Option<String>,

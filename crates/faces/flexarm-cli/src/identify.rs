@@ -16,7 +16,7 @@ use flexarm::identify::{
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
-use crate::print::say;
+use crate::print::{file_lines, say};
 use crate::shipped::OutputFolder;
 use crate::signals::stop_when_asked;
 use crate::terminal::{Terminal, answer, to_json, working};
@@ -213,11 +213,7 @@ fn text(found: &Identification) -> String {
     for caveat in found.caveats.iter().filter(|caveat| !caveat.warns()) {
         out += &format!("note: {}\n", caveat.message);
     }
-    for (what, file) in [("robot", &found.file), ("page", &found.page)] {
-        if let Some(file) = file {
-            out += &format!("{what:<8} {file}\n");
-        }
-    }
+    out += &file_lines(8, &[("robot", &found.file), ("page", &found.page)]);
     out
 }
 
@@ -322,11 +318,7 @@ fn plan_text(found: &MeasurementPlan) -> String {
     if let Some(std) = found.work_std_m {
         out += &format!("\nthe tool's displacement where the work is done will be known to {:.4} mm\n", 1e3 * std);
     }
-    for (what, file) in [("file", &found.file), ("table", &found.table)] {
-        if let Some(file) = file {
-            out += &format!("{what:<8} {file}\n");
-        }
-    }
+    out += &file_lines(8, &[("file", &found.file), ("table", &found.table)]);
     out
 }
 

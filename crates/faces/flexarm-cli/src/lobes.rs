@@ -11,6 +11,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::posed_args::PoseArgs;
+use crate::print::file_lines;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json};
 use crate::{shipped, values};
@@ -149,11 +150,7 @@ fn text(found: &Lobes) -> String {
         ("page", &found.files.page),
         ("figures", &found.files.json),
     ];
-    for (what, path) in files {
-        if let Some(path) = path {
-            out += &format!("{what:<7} {path}\n");
-        }
-    }
+    out += &file_lines(7, &files);
     out
 }
 

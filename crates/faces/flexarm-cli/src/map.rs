@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::lobes::cutting_tool;
 use crate::motion::MotionInputArgs;
-use crate::print::counted;
+use crate::print::{counted, file_lines};
 use crate::shipped::OutputFolder;
 use crate::terminal::{Bar, Terminal, answer, to_json};
 use crate::{shipped, signals, values};
@@ -280,15 +280,14 @@ fn text(map: &Map) -> String {
             placement.points
         );
     }
-    for (what, path) in [
-        ("table", &map.files.table),
-        ("page", &map.files.page),
-        ("Rerun", &map.files.rrd),
-        ("figures", &map.files.json),
-    ] {
-        if let Some(path) = path {
-            out += &format!("{what:<7} {path}\n");
-        }
-    }
+    out += &file_lines(
+        7,
+        &[
+            ("table", &map.files.table),
+            ("page", &map.files.page),
+            ("Rerun", &map.files.rrd),
+            ("figures", &map.files.json),
+        ],
+    );
     out
 }

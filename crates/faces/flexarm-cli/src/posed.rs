@@ -11,7 +11,7 @@ use flexarm::poses::{
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::posed_args::{ModesArgs, QuantityName, ResponseArgs, SpacingName, StaticsArgs};
-use crate::print::caveats;
+use crate::print::{caveats, file_lines};
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json};
 use crate::values;
@@ -126,11 +126,7 @@ fn statics_text(s: &Statics) -> String {
         let (name, value, unit) = (figure.name, figure.value, figure.unit);
         out += &format!("{name}: {value} {unit}, {}\n", figure.note);
     }
-    for (what, path) in [("picture", &s.files.picture), ("figures", &s.files.json)] {
-        if let Some(path) = path {
-            out += &format!("{what:<7} {path}\n");
-        }
-    }
+    out += &file_lines(7, &[("picture", &s.files.picture), ("figures", &s.files.json)]);
     out
 }
 
@@ -224,10 +220,6 @@ fn response_text(r: &Response) -> String {
         t.add_row(row);
     }
     out += &lines(&t);
-    for (what, path) in [("CSV", &r.files.csv), ("plot", &r.files.plot), ("figures", &r.files.json)] {
-        if let Some(path) = path {
-            out += &format!("{what:<7} {path}\n");
-        }
-    }
+    out += &file_lines(7, &[("CSV", &r.files.csv), ("plot", &r.files.plot), ("figures", &r.files.json)]);
     out
 }

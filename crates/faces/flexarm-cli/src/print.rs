@@ -183,6 +183,12 @@ fn report_table(report: &ReportTable) -> String {
     format!("\n{}\n{}", report.title, lines(&t))
 }
 
+/// Lists the files that were written, their names `width` columns wide.
+pub(crate) fn file_lines(width: usize, files: &[(&str, &Option<String>)]) -> String {
+    let written = files.iter().filter_map(|(what, path)| path.as_ref().map(|path| (what, path)));
+    written.map(|(what, path)| format!("{what:<width$} {path}\n")).collect()
+}
+
 /// Formats the figures of a reduction.
 pub(crate) fn reduction(summary: &ReduceSummary) -> String {
     let mut out = format!("link {}\n{}\n", summary.link, flexarm::links::reduce::headline(summary));
@@ -191,13 +197,9 @@ pub(crate) fn reduction(summary: &ReduceSummary) -> String {
     }
     let f = &summary.files;
     let files = [("link", &f.flex), ("job", &f.job), ("figures", &f.summary), ("report", &f.report)];
-    if files.iter().any(|(_, path)| path.is_some()) {
-        out += "\n";
-    }
-    for (what, path) in files {
-        if let Some(path) = path {
-            out += &format!("{what:<8} {path}\n");
-        }
+    let files = file_lines(8, &files);
+    if !files.is_empty() {
+        out += &format!("\n{files}");
     }
     for path in &f.pictures {
         out += &format!("picture  {path}\n");
@@ -226,13 +228,9 @@ pub(crate) fn imported(summary: &flexarm::links::import::ImportSummary) -> Strin
     }
     let f = &summary.files;
     let files = [("link", &f.flex), ("figures", &f.summary), ("report", &f.report)];
-    if files.iter().any(|(_, path)| path.is_some()) {
-        out += "\n";
-    }
-    for (what, path) in files {
-        if let Some(path) = path {
-            out += &format!("{what:<8} {path}\n");
-        }
+    let files = file_lines(8, &files);
+    if !files.is_empty() {
+        out += &format!("\n{files}");
     }
     readable(&out) + &pasted(f.entry.as_deref())
 }

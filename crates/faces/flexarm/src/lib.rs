@@ -139,10 +139,10 @@ pub mod motions {
 /// Studies of several runs, and the figures of a run.
 pub mod runs {
     pub use flexarm_run::{
-        Bending, CURVE_PIECES, DifferenceFigures, Files, HoldFigures, LinkFigures, LinkStressFigures, PoseFigures,
-        Progress, RecordingFiles, STUDY_NOTE, SampleObserver, SectionForceFigures, SettingValue, Settling,
-        ShareFigures, StepperFigures, StepperSettings, StrainGaugeFigures, StressPlaceFigures, StressPointFigures,
-        TcpFigures, Variant, Variation, compare_study, study_rows,
+        Bending, DifferenceFigures, Files, HoldFigures, LinkFigures, LinkStressFigures, PoseFigures, Progress,
+        RecordingFiles, STUDY_NOTE, SampleObserver, SectionForceFigures, SettingValue, Settling, ShareFigures,
+        StepperFigures, StepperSettings, StrainGaugeFigures, StressPlaceFigures, StressPointFigures, TcpFigures,
+        Variant, Variation, compare_study, study_rows,
     };
     pub use flexarm_stepping::ToolDeflection;
 }
@@ -194,7 +194,7 @@ pub mod recordings {
         Column, Columns, ContentLevel, CurveQuantity, DataColumn, DataTable, DataValues, FormatInfo, RecordingFormat,
         Sample, Trace, flat_columns,
     };
-    pub use flexarm_run::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format, read_run};
+    pub use flexarm_run::{ConvertOptions, ConvertSummary, convert, convert_until, parse_recording_format};
 }
 
 /// Flexible links from meshes and from matrices of other programs.

@@ -8,8 +8,6 @@
 //! the rigid part `F`. Start at [`LinearSystem::response`]; [`response_peaks`] finds resonances,
 //! [`frequency_grid`] places frequencies.
 
-use std::fmt;
-
 use nalgebra::{Complex, DMatrix};
 
 use crate::spectrum::golden_maximum;
@@ -255,10 +253,11 @@ pub fn response_peaks(grid: &[f64], values: &[f64], magnitude: impl Fn(f64) -> f
 }
 
 /// Reason why a linear structure has no solution.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum LinearError {
     /// A matrix of the wrong size.
+    #[error("the {what} has {} x {} entries, expected {} x {}", found.0, found.1, expected.0, expected.1)]
     Size {
         /// Name of the matrix.
         what: &'static str,
@@ -268,39 +267,24 @@ pub enum LinearError {
         expected: (usize, usize),
     },
     /// A NaN or infinite entry.
+    #[error("the {what} has a NaN or infinite entry")]
     NotFinite {
         /// Name of the matrix.
         what: &'static str,
     },
     /// A matrix that is not positive definite, although it must be.
+    #[error("the {what} is not positive definite")]
     NotPositiveDefinite {
         /// Name of the matrix.
         what: &'static str,
     },
     /// The eigenvalue iteration did not converge.
+    #[error("the eigenvalues of the damped structure were not found")]
     NotConverged,
     /// The dynamic stiffness is singular.
+    #[error("the structure has an undamped resonance at {} Hz, where its response is infinite", omega / std::f64::consts::TAU)]
     Resonance {
         /// Angular frequency, rad/s.
         omega: f64,
     },
 }
-
-impl fmt::Display for LinearError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Size { what, found, expected } => {
-                write!(f, "the {what} has {} x {} entries, expected {} x {}", found.0, found.1, expected.0, expected.1)
-            }
-            Self::NotFinite { what } => write!(f, "the {what} has a NaN or infinite entry"),
-            Self::NotPositiveDefinite { what } => write!(f, "the {what} is not positive definite"),
-            Self::NotConverged => write!(f, "the eigenvalues of the damped structure were not found"),
-            Self::Resonance { omega } => {
-                let hz = omega / std::f64::consts::TAU;
-                write!(f, "the structure has an undamped resonance at {hz} Hz, where its response is infinite")
-            }
-        }
-    }
-}
-
-impl std::error::Error for LinearError {}

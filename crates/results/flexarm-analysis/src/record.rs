@@ -1,8 +1,5 @@
 //! Input of the metrics, and its consistency check.
 
-use std::error::Error;
-use std::fmt;
-
 /// A record of the TCP error: one entry per sample, with uniform or varying steps.
 #[derive(Debug, Clone, Copy)]
 pub struct ErrorRecord<'a> {
@@ -21,12 +18,14 @@ pub struct ErrorRecord<'a> {
 }
 
 /// Reason why a record has no metrics.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RecordError {
     /// No samples.
+    #[error("the record has no samples; log at least one")]
     Empty,
     /// A slice whose length differs from that of `times`.
+    #[error("`{what}` has {found} entries; expected {expected}, one for each of `times`")]
     Length {
         /// Field of [`ErrorRecord`].
         what: &'static str,
@@ -36,6 +35,7 @@ pub enum RecordError {
         expected: usize,
     },
     /// A NaN or infinite value: the run has diverged or the record is damaged.
+    #[error("`{what}` has a NaN or infinite value at sample {index}: did the run diverge?")]
     NotFinite {
         /// Field of [`ErrorRecord`].
         what: &'static str,
@@ -43,6 +43,7 @@ pub enum RecordError {
         index: usize,
     },
     /// Times that do not increase.
+    #[error("sample {index}: time {this} s does not follow {previous} s; times must increase")]
     TimeNotIncreasing {
         /// Index of the offending sample.
         index: usize,
@@ -52,6 +53,7 @@ pub enum RecordError {
         this: f64,
     },
     /// A move that ends before it starts, or starts before the previous one ends.
+    #[error("move {index} from {start} s to {end} s; moves must be finite, ascending and disjoint")]
     BadMove {
         /// Index of the move.
         index: usize,
@@ -61,34 +63,12 @@ pub enum RecordError {
         end: f64,
     },
     /// A settling band that is not a positive number.
+    #[error("the settling band is {found} m; expected a positive number")]
     BadBand {
         /// Given band, m.
         found: f64,
     },
 }
-
-impl fmt::Display for RecordError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => write!(f, "the record has no samples; log at least one"),
-            Self::Length { what, found, expected } => {
-                write!(f, "`{what}` has {found} entries; expected {expected}, one for each of `times`")
-            }
-            Self::NotFinite { what, index } => {
-                write!(f, "`{what}` has a NaN or infinite value at sample {index}: did the run diverge?")
-            }
-            Self::TimeNotIncreasing { index, previous, this } => {
-                write!(f, "sample {index}: time {this} s does not follow {previous} s; times must increase")
-            }
-            Self::BadMove { index, start, end } => {
-                write!(f, "move {index} from {start} s to {end} s; moves must be finite, ascending and disjoint")
-            }
-            Self::BadBand { found } => write!(f, "the settling band is {found} m; expected a positive number"),
-        }
-    }
-}
-
-impl Error for RecordError {}
 
 impl ErrorRecord<'_> {
     /// Checks lengths, order and numbers.

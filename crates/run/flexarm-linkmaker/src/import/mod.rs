@@ -37,20 +37,21 @@ use flexarm_fe_io::exchange::{
 use flexarm_fem::gate::check_matrix12;
 use flexarm_fem::matrix_link::{MatrixPlan, MatrixReduction, link_from_superelement, turned};
 use flexarm_fem::reduction::{InterfaceFrame, Superelement, stiffness12};
-use flexarm_fem::{FemError, GateLimits, Pose, Provenance, SplitAt, UnitSystem, write_flex};
+use flexarm_fem::{FemError, GateLimits, Pose, Provenance, UnitSystem, write_flex};
 use flexarm_files::{check_apart, check_free, file_stem, write_all};
 use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
+use crate::reduce::SplitChoice;
 use crate::robot_entry::robot_entry;
 use crate::{LinkError, Stopwatch, stamp};
 use summary::Parts;
 
 pub use flexarm_fe_io::exchange::MatrixNames as Names;
 pub use flexarm_fem::matrix_link::PartMasses;
-pub use flexarm_fem::{RigidPart, SplitAt as Split, UnitSystem as UnitsOfFile};
+pub use flexarm_fem::{RigidPart, UnitSystem as UnitsOfFile};
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportSummary, markdown, tables};
-pub use words::{FrameAt, ImportFormat, ImportMap, NodePlane, parse_inertia, parse_part, parse_split, triple};
+pub use words::{FrameAt, ImportFormat, ImportMap, NodePlane, parse_inertia, parse_part, triple};
 
 /// Warning about a modal link without its second-order terms, used here and where a robot uses such
 /// a link.
@@ -85,7 +86,7 @@ pub struct ImportJob {
     /// Masses of the parts (SI, link axes).
     pub masses: PartMasses,
     /// Position of the elastic joint; a point is in the unit of the files.
-    pub split: SplitAt,
+    pub split: SplitChoice,
     /// Name of the link; `None`: that of the first file.
     pub name: Option<String>,
 }
@@ -103,7 +104,7 @@ impl Default for ImportJob {
             axes_rpy: Vector3::zeros(),
             modes: None,
             masses: PartMasses::FromMatrix,
-            split: SplitAt::ElasticCentre,
+            split: SplitChoice::ElasticCentre,
             name: None,
         }
     }
@@ -361,10 +362,7 @@ fn plan(job: &ImportJob, name: &str, units: UnitSystem, source: &str, method: &s
     MatrixPlan {
         name: name.to_owned(),
         masses: job.masses.clone(),
-        split: match job.split {
-            SplitAt::Point(p) => SplitAt::Point(p * units.length),
-            other => other,
-        },
+        split: job.split.at(units.length),
         limits: GateLimits::default(),
         provenance: Provenance {
             source: source.to_owned(),

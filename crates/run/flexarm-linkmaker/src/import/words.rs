@@ -5,7 +5,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use flexarm_fe_io::exchange::{InterfaceMap, MatrixFormat};
-use flexarm_fem::{RigidPart, SplitAt};
+use flexarm_fem::RigidPart;
 use flexarm_settings::Words;
 use nalgebra::{Matrix3, Vector3};
 
@@ -217,25 +217,6 @@ pub fn parse_inertia(text: &str) -> Result<Matrix3<f64>, WordError> {
         return Err(WordError::form(text, "ixx,iyy,izz,ixy,ixz,iyz"));
     };
     Ok(Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
-}
-
-/// Parses the position of the elastic joint: `elastic-centre`, `mid`, a fraction, or a point in the
-/// unit of the file.
-///
-/// # Errors
-/// [`WordError`].
-pub fn parse_split(text: &str) -> Result<SplitAt, WordError> {
-    let expected = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or x,y,z";
-    let wrong = || WordError(format!("split {text:?}: expected {expected}"));
-    match text.trim() {
-        "elastic-centre" | "elastic-center" => Ok(SplitAt::ElasticCentre),
-        "mid" => Ok(SplitAt::MidLength),
-        other => match numbers(other).map_err(|_| wrong())?[..] {
-            [x] if (0.0..=1.0).contains(&x) => Ok(SplitAt::Fraction(x)),
-            [x, y, z] => Ok(SplitAt::Point(Vector3::new(x, y, z))),
-            _ => Err(wrong()),
-        },
-    }
 }
 
 /// Parses three finite numbers separated by commas.

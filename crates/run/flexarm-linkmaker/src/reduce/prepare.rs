@@ -8,16 +8,15 @@ use flexarm_fem::mesh_link::MeshLinkError;
 use flexarm_fem::model::AssemblyOptions;
 use flexarm_fem::reduction::{CondensationOptions, ReductionError, TieError};
 use flexarm_fem::sparse::{ModesWanted, Ordering};
-use flexarm_fem::{GateLimits, LinkPlan, Material, Provenance, SplitAt, UnitSystem, mass_properties};
+use flexarm_fem::{GateLimits, LinkPlan, Material, Provenance, UnitSystem, mass_properties};
 use flexarm_settings::{Finding, Setting, Words};
 use flexarm_spatial::Pose;
-use nalgebra::Vector3;
 
 use super::interfaces::{MeshFrame, SelectedInterface, pose};
 use super::job::ReduceJob;
 use super::summary::{MaterialFigures, RegionFigures};
 use super::urdf_link::UrdfLink;
-use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, SplitChoice, described};
+use super::words::{MATERIAL_FORMS, OrderingChoice, QuadratureChoice, described};
 use super::{JUDGED_MODES, MAX_MODES, MODES};
 use crate::{LinkError, stamp};
 
@@ -225,12 +224,7 @@ fn plan(
     chosen: &[SelectedInterface],
     materials: &[RegionFigures],
 ) -> LinkPlan {
-    let split = match job.split.unwrap_or_default() {
-        SplitChoice::ElasticCentre => SplitAt::ElasticCentre,
-        SplitChoice::Mid => SplitAt::MidLength,
-        SplitChoice::Fraction(fraction) => SplitAt::Fraction(fraction),
-        SplitChoice::Point(point) => SplitAt::Point(Vector3::from(point) * units.length),
-    };
+    let split = job.split.unwrap_or_default().at(units.length);
     let ordering = match job.ordering.unwrap_or_default() {
         OrderingChoice::Auto => Ordering::Auto,
         OrderingChoice::Amd => Ordering::MinimumDegree,

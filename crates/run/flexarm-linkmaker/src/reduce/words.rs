@@ -3,8 +3,9 @@
 use std::fmt;
 use std::str::FromStr;
 
-use flexarm_fem::Material;
+use flexarm_fem::{Material, SplitAt};
 use flexarm_settings::Words;
+use nalgebra::Vector3;
 use serde::de::{Error as _, SeqAccess, Visitor, value::SeqAccessDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -106,7 +107,7 @@ pub enum SplitChoice {
     Mid,
     /// At a fraction of the distance from A to B.
     Fraction(f64),
-    /// At a point of the link frame, in the unit of the mesh.
+    /// At a point of the link frame, in the unit of the file.
     Point([f64; 3]),
 }
 
@@ -114,6 +115,16 @@ pub enum SplitChoice {
 const SPLIT_FORMS: &str = "elastic-centre, mid, a fraction of the distance from A to B (0 to 1), or a point x,y,z";
 
 impl SplitChoice {
+    /// Converts from a unit of length in metres.
+    pub(crate) fn at(self, unit_m: f64) -> SplitAt {
+        match self {
+            Self::ElasticCentre => SplitAt::ElasticCentre,
+            Self::Mid => SplitAt::MidLength,
+            Self::Fraction(fraction) => SplitAt::Fraction(fraction),
+            Self::Point(point) => SplitAt::Point(Vector3::from(point) * unit_m),
+        }
+    }
+
     fn fraction(x: f64) -> Result<Self, WordError> {
         let inside = x.is_finite() && (0.0..=1.0).contains(&x);
         inside.then_some(Self::Fraction(x)).ok_or_else(|| WordError(format!("split is {x}; expected {SPLIT_FORMS}")))

@@ -31,12 +31,10 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use flexarm_flexlink::Mounting;
 use flexarm_kinematics::{Frame, Mechanism, Model, Pose};
-use flexarm_stepping::{Damping, Plant};
+use flexarm_stepping::Plant;
 use flexarm_urdf::UrdfRobot;
 
-use crate::arm::options::Modelling;
 use crate::caveat::{self, Finding};
 use crate::error::Error;
 use crate::robot::calibration_entry::Calibration;
@@ -147,20 +145,6 @@ impl Robot {
     /// Whether the elastic mounting has this name.
     pub fn stands_on(&self, name: &str) -> bool {
         self.mounting.as_ref().is_some_and(|mounting| mounting.name() == name)
-    }
-
-    /// Puts the robot on six springs.
-    ///
-    /// * `springs`: their frame in the base link, their stiffness in that frame, and the mass they
-    ///   carry in addition to the base.
-    ///
-    /// # Errors
-    /// [`Error::Modelling`] if the stiffness is singular or the name is that of a link,
-    /// [`Error::Pose`] and others as [`Robot::model`].
-    pub fn with_mounting(mut self, springs: Mounting, damping: Damping) -> Result<Self, Error> {
-        self.mounting = Some(RobotMounting::Springs { springs, damping, play: Vec::new() });
-        self.model(&Modelling::default())?;
-        Ok(self)
     }
 
     /// Returns the coupling of motors that move several joints; their rotors are in
