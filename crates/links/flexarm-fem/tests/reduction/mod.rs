@@ -31,7 +31,7 @@ fn held_compliance(reduction: &Condensation<'_>) -> DMatrix<f64> {
 
 /// Maximum of some measures; NaN if any of them is NaN.
 fn worst(values: Vec<f64>) -> f64 {
-    values.into_iter().fold(0.0, |worst: f64, x| if !(x <= worst) { x } else { worst })
+    values.into_iter().fold(0.0, |worst: f64, x| if x <= worst { worst } else { x })
 }
 
 const STEEL: Material = Material::STEEL;

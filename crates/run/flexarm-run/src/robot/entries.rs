@@ -1,4 +1,4 @@
-//! Entries of a robot file that change the rigid robot: joints, payload, TCP and masses of links.
+//! Entries of a robot file that change the rigid robot: joints, payload, TCP and masses of beams.
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::Parts;
@@ -6,7 +6,6 @@ use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use flexarm_settings::known_names;
 use flexarm_urdf::{UrdfRobot, default_tcp};
 use nalgebra::{Matrix3, Vector3};
-use serde::Deserialize;
 use toml::Spanned;
 
 use super::load::LoadOptions;
@@ -117,61 +116,6 @@ impl Robot {
     }
 }
 
-/// Mass and centre of mass of a rigid link, as written.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct InertialEntry {
-    /// Link of the URDF.
-    pub link: Spanned<String>,
-    /// Mass (kg); radii of gyration stay.
-    pub mass: Option<Spanned<f64>>,
-    /// Centre of mass, link axes (m).
-    pub com: Option<Spanned<[f64; 3]>>,
-}
-
-/// Sets mass and centre of mass of a link in the mechanisms of a robot.
-pub(super) fn weigh(
-    entry: &InertialEntry,
-    file: &RobotFile,
-    mechanisms: &mut [&mut Mechanism],
-    source: &Source,
-) -> Result<(), RobotFileError> {
-    let name = entry.link.get_ref();
-    let fail = |message: String| source.error(entry.link.span(), format!("inertial of link {name:?}: {message}"));
-    if mechanisms.iter().all(|mechanism| mechanism.link(name).is_none()) {
-        return Err(source.error(entry.link.span(), unknown_link("inertial", name, mechanisms[0])));
-    }
-    let mut same = file.inertial.iter().filter(|other| other.link.get_ref() == name);
-    if same.next().is_some_and(|first| first.link.span() != entry.link.span()) {
-        return Err(fail("it has two [[inertial]] entries: keep one".into()));
-    }
-    if file.flexible_link.iter().any(|link| link.link.get_ref() == name) {
-        let message = "the link is flexible: give `mass` of its [[flexible_link]] (beams), or its parts (.flex)";
-        return Err(fail(message.into()));
-    }
-    if let Some(com) = &entry.com {
-        check_finite("inertial com", com.get_ref(), com.span(), source)?;
-    }
-    if let Some(mass) = entry.mass.as_ref().filter(|mass| !(*mass.get_ref() > 0.0 && mass.get_ref().is_finite())) {
-        let message = format!("inertial mass = {}: expected a positive number of kg", mass.get_ref());
-        return Err(source.error(mass.span(), message));
-    }
-    let links = mechanisms.iter_mut().flat_map(|mechanism| &mut mechanism.links).filter(|link| link.name == *name);
-    for link in links {
-        let Some(inertia) = link.inertia.as_mut().filter(|inertia| inertia.mass > 0.0) else {
-            return Err(fail("the URDF gives it no mass that could be changed: add <inertial> there".into()));
-        };
-        if let Some(com) = &entry.com {
-            inertia.com = Vector3::from(*com.get_ref());
-        }
-        if let Some(mass) = &entry.mass {
-            inertia.inertia_com *= mass.get_ref() / inertia.mass;
-            inertia.mass = *mass.get_ref();
-        }
-    }
-    Ok(())
-}
-
 /// Turns a rotating joint into a helical one with `lead` metres per turn.
 pub(super) fn make_helical(
     mechanism: &mut Mechanism,
@@ -244,7 +188,7 @@ pub(super) fn held_joint(
     Ok((name.to_owned(), at))
 }
 
-fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
+pub(super) fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
     let known: Vec<_> = mechanism.links.iter().map(|l| l.name.as_str()).collect();
     format!("{what} link {link:?} is not a link of the URDF; its links are {}", known_names(link, &known))
 }

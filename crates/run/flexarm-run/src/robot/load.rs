@@ -8,7 +8,8 @@ use flexarm_kinematics::{Joint, JointKind, Link, Mechanism, Pose};
 use flexarm_urdf::{InertiaEstimate, ReadOptions, UrdfRobot, default_tcp, parse_urdf, read_urdf};
 use toml::Spanned;
 
-use super::entries::{held_joint, limit_effort, make_helical, tcp_of, weigh};
+use super::entries::{held_joint, limit_effort, make_helical, tcp_of};
+use super::inertial_entry::weigh;
 use super::{Robot, TCP_FRAME, finding_text};
 use crate::arm::Arm;
 use crate::arm::options::Modelling;

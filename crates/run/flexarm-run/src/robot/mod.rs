@@ -14,6 +14,7 @@ pub(crate) mod gauge_entry;
 pub(crate) mod gear_entry;
 pub(crate) mod gearbox_entry;
 pub(crate) mod guide_entry;
+pub(crate) mod inertial_entry;
 pub(crate) mod link_entry;
 pub(crate) mod loop_entry;
 pub mod loops;
