@@ -13,7 +13,7 @@ use super::{PAYLOAD_LINK, Robot};
 use crate::body_change::BodyChange;
 use crate::caveat::Finding;
 use crate::error::Error;
-use crate::robot::entry_checks::{check_finite, loop_of_joint, pose};
+use crate::robot::entry_checks::{check_finite, loop_of_joint, pose, unknown_link};
 use crate::robot::link_entry::FlexibleLinkEntry;
 use crate::robot::robot_file::{PayloadEntry, RobotFile};
 use crate::robot::robot_link::RobotLink;
@@ -186,11 +186,6 @@ pub(super) fn held_joint(
         return Err(source.error(value.span(), message));
     }
     Ok((name.to_owned(), at))
-}
-
-pub(super) fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
-    let known: Vec<_> = mechanism.links.iter().map(|l| l.name.as_str()).collect();
-    format!("{what} link {link:?} is not a link of the URDF; its links are {}", known_names(link, &known))
 }
 
 pub(super) fn tcp_of(

@@ -2,6 +2,7 @@
 
 use flexarm_files::{Source, TextFileError};
 use flexarm_kinematics::{Mechanism, Pose};
+use flexarm_settings::known_names;
 use nalgebra::{Rotation3, Translation3, Vector3};
 
 use crate::error::Error;
@@ -27,6 +28,12 @@ pub(crate) fn check_finite(
 /// Returns the name of the loop that determines a dependent joint.
 pub(crate) fn loop_of_joint<'m>(mechanism: &'m Mechanism, joint: &str) -> Option<&'m str> {
     mechanism.loops.iter().find(|l| l.dependent.iter().any(|d| d == joint)).map(|l| l.name.as_str())
+}
+
+/// Returns the message that an entry names a link that the URDF does not have.
+pub(crate) fn unknown_link(what: &str, link: &str, mechanism: &Mechanism) -> String {
+    let known: Vec<_> = mechanism.links.iter().map(|l| l.name.as_str()).collect();
+    format!("{what} link {link:?} is not a link of the URDF; its links are {}", known_names(link, &known))
 }
 
 /// Returns the value, or records the error so that later errors are found too.

@@ -6,9 +6,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::entries::unknown_link;
-use super::entry_checks::check_finite;
-use super::robot_file::RobotFile;
+use super::entry_checks::{check_finite, unknown_link};
 
 /// Mass and centre of mass of a rigid link, as written.
 #[derive(Clone, Debug, Deserialize)]
@@ -22,10 +20,12 @@ pub(crate) struct InertialEntry {
     pub com: Option<Spanned<[f64; 3]>>,
 }
 
-/// Sets mass and centre of mass of a link in the mechanisms of a robot.
+/// Sets mass and centre of mass of a link in the mechanisms of a robot. `entries` are all of the
+/// file.
 pub(super) fn weigh(
     entry: &InertialEntry,
-    file: &RobotFile,
+    entries: &[InertialEntry],
+    is_flexible: bool,
     mechanisms: &mut [&mut Mechanism],
     source: &Source,
 ) -> Result<(), RobotFileError> {
@@ -34,11 +34,11 @@ pub(super) fn weigh(
     if mechanisms.iter().all(|mechanism| mechanism.link(name).is_none()) {
         return Err(source.error(entry.link.span(), unknown_link("inertial", name, mechanisms[0])));
     }
-    let mut same = file.inertial.iter().filter(|other| other.link.get_ref() == name);
+    let mut same = entries.iter().filter(|other| other.link.get_ref() == name);
     if same.next().is_some_and(|first| first.link.span() != entry.link.span()) {
         return Err(fail("it has two [[inertial]] entries: keep one".into()));
     }
-    if file.flexible_link.iter().any(|link| link.link.get_ref() == name) {
+    if is_flexible {
         let message = "the link is flexible: give `mass` of its [[flexible_link]] (beams), or its parts (.flex)";
         return Err(fail(message.into()));
     }

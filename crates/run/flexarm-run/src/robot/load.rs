@@ -315,7 +315,9 @@ fn changed_mechanism(
     let (calibration, wrong) = calibrate(&file.calibration, &mut [&mut rigid, urdf], source);
     faults.extend(wrong.into_iter().map(Error::from));
     for entry in &file.inertial {
-        keep(weigh(entry, file, &mut [&mut rigid, urdf], source).map_err(Error::from), faults);
+        let is_flexible = file.flexible_link.iter().any(|link| link.link.get_ref() == entry.link.get_ref());
+        let weighed = weigh(entry, &file.inertial, is_flexible, &mut [&mut rigid, urdf], source);
+        keep(weighed.map_err(Error::from), faults);
     }
     for (joint, limit) in &file.effort_limit {
         keep(limit_effort(&mut rigid, joint, limit, source).map_err(Error::from), faults);
