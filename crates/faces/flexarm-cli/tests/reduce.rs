@@ -440,6 +440,23 @@ mod refused {
     use super::*;
 
     #[test]
+    fn is_a_mesh_without_modes_in_wrong_units_by_its_size() {
+        let place = place();
+        let robot = common::shipped_robot("kr210");
+        let folder = std::path::Path::new(&robot);
+        let text = std::fs::read_to_string(folder.join("fe/link_2.reduce.toml")).unwrap();
+        let text = with(&text, "units = \"m-kg-s\"", "units = \"mm-t-s\"");
+        let text = with(&text, "link_2.msh.gz", folder.join("fe/link_2.msh.gz").to_str().unwrap());
+        place.write("job.toml", with(&text, "../kr210.urdf", folder.join("kr210.urdf").to_str().unwrap()));
+        let run = place.flexarm(&["reduce", "job.toml"]);
+        assert!(
+            run.err.contains("0 of 10 modes found") && run.err.contains("with units mm-t-s the largest"),
+            "{}",
+            run.err
+        );
+    }
+
+    #[test]
     fn is_what_is_missing_with_what_can_be_typed() {
         let place = place();
         place.refused(

@@ -304,7 +304,8 @@ pub(super) fn quadrature_name(job: &ReduceJob) -> &'static str {
     job.quadrature.unwrap_or_default().word().unwrap_or_default()
 }
 
-/// Adds the number and the position of the node in the file to an error.
+/// Adds to an error the number and the position of the node in the file; to one about modes the size
+/// of the mesh, because wrong units are the usual cause.
 pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source: MeshLinkError) -> LinkError {
     let node = match &source {
         MeshLinkError::Reduction(ReductionError::Tie(TieError::Overlap { node, .. })) => Some(*node as usize),
@@ -316,5 +317,12 @@ pub(super) fn failed(job: &ReduceJob, file: &MeshFile, units: UnitSystem, source
         let (id, p) = (file.mesh.node_ids.get(node)?, file.mesh.nodes.get(node)? / units.length);
         Some(format!("; in the file this is node {id}, at {:.6}, {:.6}, {:.6} in the unit of the mesh", p.x, p.y, p.z))
     });
-    LinkError::Reduction { path: job.mesh.clone(), note: described.unwrap_or_default(), source: Box::new(source) }
+    let mut note = described.unwrap_or_default();
+    if let MeshLinkError::Modes(_) | MeshLinkError::Reduction(ReductionError::Modes(_)) = source
+        && let Some((low, high)) = file.mesh.bounding_box()
+    {
+        let (size, units) = ((high - low).amax(), units.name());
+        note = format!("; with units {units} the largest dimension of the mesh is {size:.3e} m: are they its units?");
+    }
+    LinkError::Reduction { path: job.mesh.clone(), note, source: Box::new(source) }
 }
