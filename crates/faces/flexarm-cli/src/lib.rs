@@ -42,17 +42,18 @@ mod terminal;
 mod values;
 mod view;
 
+use std::error::Error as _;
 use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::sync::Mutex;
 
 use clap::builder::{PossibleValue, Resettable, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, CommandFactory, Parser};
 use commands::Cli;
 use flexarm::settings::written::message;
+use rayon::ThreadPoolBuildError;
 
 /// Runs a command line, program name first, and returns the exit code of the process: 0 success, 1
 /// failed run, 2 bad input.
@@ -64,7 +65,8 @@ pub fn run(line: Vec<OsString>) -> u8 {
         // Nothing can be done about a closed stream.
         let _ = writeln!(
             anstream::stderr(),
-            "error: the system starts no thread ({error}): raise the limits of memory and processes (ulimit -v, -u)"
+            "error: the threads of the program cannot be started: {error}; set {THREADS} to 1, or raise the limits of \
+             memory and processes (ulimit -v, -u)"
         );
         return 1;
     }
@@ -124,44 +126,18 @@ pub fn whole_help(line: &[OsString]) -> StyledStr {
 }
 
 /// Starts the threads that share the work of a command: as many as there are processors, or fewer
-/// if the environment says so or the system starts fewer, as under a limit of memory.
+/// if the environment says so. Without this, a system that starts none, as under a limit of memory,
+/// would end the program in the middle of a command.
 ///
 /// # Errors
-/// If it starts none.
-fn start_threads() -> std::io::Result<()> {
+/// If the system does not start them.
+fn start_threads() -> Result<(), ThreadPoolBuildError> {
     if cfg!(target_family = "wasm") {
         return Ok(()); // there are none
     }
-    let processors = std::thread::available_parallelism()?.get();
-    let wanted = asked_threads().map_or(processors, |asked| asked.min(processors));
-    // The memory of one more thread is left for the pool itself.
-    let number = startable(wanted + 1)?.saturating_sub(1).max(1);
-    // Fails only if there is a pool already, which then stays as it is.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(number).build_global();
-    Ok(())
-}
-
-/// Returns how many of some threads the system starts: a pool that gets only a part of its threads
-/// does not work.
-fn startable(wanted: usize) -> std::io::Result<usize> {
-    let gate = Mutex::new(());
-    std::thread::scope(|scope| {
-        let closed = gate.lock();
-        let start = |_| std::thread::Builder::new().spawn_scoped(scope, || drop(gate.lock()));
-        let mut started = 0;
-        let refused = (0..wanted).map(start).find_map(|thread| match thread {
-            Ok(_) => {
-                started += 1;
-                None
-            }
-            Err(error) => Some(error),
-        });
-        drop(closed);
-        match refused {
-            Some(error) if started == 0 => Err(error),
-            _ => Ok(started),
-        }
-    })
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(fewer_threads().unwrap_or(0)).build_global();
+    // Without a source the error is that there is a pool already, which then stays as it is.
+    pool.or_else(|error| if error.source().is_some() { Err(error) } else { Ok(()) })
 }
 
 /// Variable of the environment with the number of threads.
@@ -171,14 +147,10 @@ pub const THREADS: &str = "RAYON_NUM_THREADS";
 /// ([`THREADS`]), which cost time and memory and compute nothing sooner.
 pub fn fewer_threads() -> Option<usize> {
     let processors = std::thread::available_parallelism().ok()?.get();
-    (asked_threads()? > processors).then_some(processors)
-}
-
-/// Returns the number of threads for which the environment asks.
-fn asked_threads() -> Option<usize> {
     // The second name is an older one of the same number.
     let number = |name| std::env::var(name).ok().and_then(|text| text.parse::<usize>().ok());
-    [THREADS, "RAYON_RS_NUM_CPUS"].into_iter().find_map(number).filter(|number| *number > 0)
+    let asked = [THREADS, "RAYON_RS_NUM_CPUS"].into_iter().find_map(number)?;
+    (asked > processors).then_some(processors)
 }
 
 /// Escapes control characters in the quoted user input, which a terminal would execute.
