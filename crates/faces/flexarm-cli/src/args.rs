@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use flexarm::recordings::RecordingFormat;
 use flexarm::robots::{InertiaEstimate, ReadOptions};
 use flexarm::settings::Words;
 use flexarm::steppers::{ConstraintForm, ReferenceMethod, STEPPERS, SpookPreset, Start, StepperEntry};
@@ -137,7 +136,7 @@ impl ModellingArgs {
 #[command(after_long_help = EXAMPLES, after_help = "All options, with examples: --help")]
 pub(crate) struct RunArgs {
     /// robot.toml, a folder with one, a .urdf or .xacro file, or the name of a shipped robot
-    /// [default: kr210]
+    /// [default: fanuc_r2000_210f]
     pub(crate) robot: Option<PathBuf>,
     /// Motion of any format (flexarm format motion), or the name of a shipped one [default: the
     /// robot's own]
@@ -251,9 +250,6 @@ pub(crate) struct RunArgs {
     /// Also write the table as Parquet (run.parquet); not readable before the run ends
     #[arg(long, help_heading = "Files", hide_short_help = true, conflicts_with = "no_files")]
     pub(crate) parquet: bool,
-    /// Also write the run in this format (may be repeated)
-    #[arg(long, help_heading = "Files", hide_short_help = true, value_name = "FORMAT", conflicts_with = "no_files", value_parser = formats::also())]
-    pub(crate) also: Vec<RecordingFormat>,
     /// Write no files, only print the figures
     #[arg(long, help_heading = "Files", conflicts_with_all = ["output", "force", "figures"])]
     pub(crate) no_files: bool,

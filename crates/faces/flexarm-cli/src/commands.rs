@@ -73,7 +73,7 @@ Studies:
 Flexible links:
   reduce       Create a flexible link from a finite element mesh
   import       Create a flexible link from matrices of another program
-  export       Write the matrices of a flexible link for another program
+  export       Write an arm, or the matrices of a link, for other programs
 
 Other programs:
   export-fmu   Write the arm as an FMU, a plant for control programs
@@ -100,7 +100,7 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Run the flexible robot and its rigid twin, log both, measure the TCP error
     ///
-    /// Without arguments: the shipped industrial arm on its pick-and-place cycle.
+    /// Without arguments: the shipped arm fanuc_r2000_210f on its handling cycle.
     Compare(Later<RunArgs>),
     /// Run one model along a trajectory and log it
     Run(Later<RunArgs>),
@@ -118,8 +118,8 @@ pub(crate) enum Command {
     /// Find the motion with which the flexible arm's TCP follows the rigid one's, and evaluate it
     /// on other plants
     Compensate(Later<CompensateArgs>),
-    /// Derivatives of the TCP error along a motion with respect to all parameters of the robot,
-    /// from one run
+    /// Derivatives of the TCP error along a motion with respect to all parameters of the robot, by
+    /// central differences of runs
     Sensitivity(Later<SensitivityArgs>),
     /// Sag, stiffness and frequencies over the workspace, over joints or along a motion, and where
     /// to put a workpiece

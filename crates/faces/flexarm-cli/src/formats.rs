@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use flexarm::Outputs;
 use flexarm::recordings::RecordingFormat;
 
@@ -55,30 +54,18 @@ pub fn help_page() -> String {
     format!("Recordings: {}", RecordingFormat::ALL.map(|format| format.to_string()).join(", "))
 }
 
-/// Parser for `--also`: formats that a run does not write by default.
-pub(crate) fn also() -> impl TypedValueParser<Value = RecordingFormat> {
-    let formats = RecordingFormat::ALL.map(RecordingFormat::info).into_iter().filter(|info| !info.by_default);
-    let words = formats.map(|info| {
-        let late = if info.survives_a_kill { "" } else { "; not readable before the run ends" };
-        PossibleValue::new(info.extension).help(format!("{} ({}){late}", info.name, info.file_name))
-    });
-    let parser = PossibleValuesParser::new(words.collect::<Vec<_>>());
-    parser.try_map(|word| flexarm::recordings::parse_recording_format(&word))
-}
-
 /// Returns the output folder of a run and the requested files.
 ///
 /// # Errors
 /// [`Failure::Usage`] for a format that is disabled in this build.
 pub(crate) fn outputs(args: &RunArgs, folder: PathBuf) -> Result<Outputs, Failure> {
     let mut outputs = Outputs { overwrite: args.force, figures: args.figures, ..Outputs::everything(folder) };
-    let parquet = args.parquet.then(|| (RecordingFormat::Parquet, "--parquet".to_owned()));
-    let also = args.also.iter().map(|&format| (format, format!("--also {}", format.extension())));
-    for (format, flag) in parquet.into_iter().chain(also) {
+    if args.parquet {
+        let format = RecordingFormat::Parquet;
         if !format.is_built_in() {
             let built = build_with(format);
             return Err(Failure::Usage(format!(
-                "this program was built without {format}: omit {flag}, or use {built}"
+                "this program was built without {format}: omit --parquet, or use {built}"
             )));
         }
         outputs = outputs.with(format);

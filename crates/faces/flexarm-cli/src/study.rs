@@ -20,8 +20,7 @@ pub(crate) struct Part<'a> {
 const MAX_OTHERS: usize = 50;
 
 /// Options that apply to the study as a whole.
-const SHARED: [&str; 10] =
-    ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet", "also"];
+const SHARED: [&str; 9] = ["with", "output", "force", "no-files", "magnify", "json", "quiet", "figures", "parquet"];
 
 /// Returns the caveats of all runs without duplicates; those of additional runs carry their labels.
 pub(crate) fn caveats(summary: &Summary) -> Vec<Finding> {

@@ -509,6 +509,11 @@ mod folders {
             (summary["robot"].as_str(), summary["trajectory"].as_str()),
             (Some("fanuc_r2000_210f"), Some("handling"))
         );
+        let help = place.flexarm(&["help", "compare"]).out;
+        assert!(
+            help.contains("[default: fanuc_r2000_210f]") && help.contains("fanuc_r2000_210f on its handling"),
+            "{help}"
+        );
         let report = place.text("out/fanuc_r2000_210f-handling-001/report.md");
         let headline = summary["headline"].as_str().unwrap();
         assert!(headline.contains("static") && headline.contains("gearboxes"), "{headline}");

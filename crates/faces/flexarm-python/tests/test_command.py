@@ -19,7 +19,7 @@ def test_the_first_command_works_in_an_empty_folder(tmp_path: Path) -> None:
     files = json.loads(done.stdout)["files"]
     for kind in ["csv", "mcap", "rrd", "report"]:
         assert (tmp_path / files[kind]).stat().st_size > 1000, kind
-    assert command("compare", "--also", "parquet", "-q", cwd=tmp_path).returncode == 0
+    assert command("compare", "--parquet", "-q", cwd=tmp_path).returncode == 0
     assert list((tmp_path / "out").rglob("run.parquet"))
 
 
