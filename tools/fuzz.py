@@ -885,7 +885,7 @@ def with_visual(shape):
 
 
 BOX = with_visual('<box size="0.8 0.02 0.04"/>')
-TELESCOPE = (ROOT / "crates/faces/flexarm/tests/data/lift.urdf").read_text()
+TELESCOPE = (ROOT / "crates/run/flexarm-run/tests/data/lift.urdf").read_text()
 
 TELESCOPE_ROBOT = """format = 1
 urdf = "beam.urdf"

@@ -4,6 +4,7 @@
 
 mod import;
 mod job;
+mod mesh_mutations;
 mod names;
 mod urdf_link;
 mod words;

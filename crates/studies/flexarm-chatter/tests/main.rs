@@ -6,5 +6,6 @@
 mod classical_cases;
 mod closed_forms;
 mod leading;
+mod lobes;
 mod moments;
 mod time_integration;

@@ -5,14 +5,21 @@
 #![allow(non_snake_case, reason = "monogram notation")]
 
 mod calibration;
+mod coupled_encoders;
 mod coupled_gears;
 mod encoders;
 mod entries_and_tool;
+mod entry_files;
+mod files;
 mod identify;
 mod least_squares;
+mod levers;
 mod parameters;
 mod placement;
+mod recorded_encoders;
+mod response;
 mod rewrite;
 mod scatter;
 mod sensitivities;
+mod shipped_robots;
 mod uff;

@@ -2,5 +2,6 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation")]
 
+mod map;
 mod region;
 mod table;

@@ -5,3 +5,4 @@
 mod beams;
 mod chain;
 mod guesses;
+mod new_robot;

@@ -15,3 +15,4 @@ mod replay;
 mod run_caveats;
 mod sample;
 mod sobol;
+mod studies;
