@@ -11,6 +11,7 @@
 //! [ H_ηr  H_ηη ] [ η̈ ] + [ p_η ] = [ τ ]        I_A = I_rr - H_rη H_ηη^-1 H_ηr,   p_A = p_r + H_rη H_ηη^-1 (τ - p_η)
 //! ```
 //!
+//! Start at [`solve_articulated`]. Not here: closed loops (`closure`), modal mass integrals (`modal`).
 //! Source: [Featherstone 2008], Table 7.1 (articulated bodies) and section 9.2 (hybrid dynamics).
 
 use flexarm_spatial::products::{mul, mul3, tr_mul, tr_mul3};
@@ -26,7 +27,7 @@ use crate::rnea::nonlinear_effects;
 /// Set of prescribed joints; all others are free.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Roles {
-    pub(crate) prescribed_body: Vec<bool>,
+    prescribed_body: Vec<bool>,
     prescribed_modal: Vec<bool>,
     free_coordinates: Vec<usize>,
     /// Whether a free coordinate moves several joints (mimic joints, closed loops) or has a coupled
@@ -86,7 +87,10 @@ impl Roles {
 /// loops. Accelerations are NaN where a mass matrix is not positive definite.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If a vector is not nv long, or `data` or the roles are of another model.
+///
+/// # Source
+/// [Featherstone 2008], Table 7.1.
 pub fn forward_dynamics<'d>(
     model: &Model,
     data: &'d mut Data,
@@ -96,6 +100,7 @@ pub fn forward_dynamics<'d>(
 ) -> &'d DVector<f64> {
     state.check_sizes(model);
     model.check_size("tau", tau.len());
+    check_workspaces(model, data, roles_all_free);
     data.tau.as_mut_slice().copy_from_slice(tau.as_slice());
     solve(model, data, state, roles_all_free);
     &data.qddot
@@ -110,7 +115,10 @@ pub fn forward_dynamics<'d>(
 /// positive definite.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If a vector is not nv long, or `data` or the roles are of another model.
+///
+/// # Source
+/// [Featherstone 2008], section 9.2.
 pub fn hybrid_dynamics(
     model: &Model,
     data: &mut Data,
@@ -122,6 +130,7 @@ pub fn hybrid_dynamics(
     state.check_sizes(model);
     model.check_size("qddot", qddot.len());
     model.check_size("tau", tau.len());
+    check_workspaces(model, data, roles);
     data.tau.as_mut_slice().copy_from_slice(tau.as_slice());
     data.qddot.as_mut_slice().copy_from_slice(qddot.as_slice());
     solve(model, data, state, roles);
@@ -129,6 +138,15 @@ pub fn hybrid_dynamics(
     qddot.as_mut_slice().copy_from_slice(data.qddot.as_slice());
 }
 
+/// Checks that data and roles are those of the model.
+#[track_caller]
+fn check_workspaces(model: &Model, data: &Data, roles: &Roles) {
+    data.check_sizes(model);
+    let (found, expected) = (roles.prescribed_body.len(), model.bodies.len());
+    assert!(found == expected, "the roles are those of a model of {found} bodies, this one has {expected}");
+}
+
+/// Solves for the unknown entries of `data.{qddot, tau}`: along the tree, or dense.
 fn solve(model: &Model, data: &mut Data, state: &State, roles: &Roles) {
     if !model.loops.is_empty() {
         closure::solve(model, data, state, &roles.free_coordinates);

@@ -4,8 +4,8 @@
 //! carried inward, gives one column of M. All quantities are in the axes of the first body of the
 //! arm, so that carrying a wrench inward changes only its moment. The six columns of an elastic
 //! joint are processed together. The coordinates of a modal body give n more columns: its own `C_t`
-//! and `C_r` plus the contribution of the bodies on its interfaces. Source: [Featherstone 2008],
-//! Table 6.2.
+//! and `C_r` plus the contribution of the bodies on its interfaces. Start at [`composite_bodies`].
+//! Not here: reduction of M by closed loops (`closure`). Source: [Featherstone 2008], Table 6.2.
 
 use std::ops::Add;
 
@@ -19,27 +19,31 @@ use crate::data::{Data, ElasticSubspace, begin, joint_position};
 use crate::kinematics::turned;
 use crate::model::{Body, JointMotion, Model};
 
-/// Computes the mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²). Fills
+/// Computes the mass matrix `M(q)`, nv×nv, both triangles (kg, kg m, kg m²), rotors included. Fills
 /// `data.{X_PB, M}`. Does not allocate.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If `q` is not nv long, or `data` is of another model.
+///
+/// # Source
+/// [Featherstone 2008], Table 6.2.
 pub fn mass_matrix<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DMatrix<f64> {
     model.check_size("q", q.len());
-    if !model.loops.is_empty() {
+    data.check_sizes(model);
+    if model.loops.is_empty() {
+        begin(model, data, q.as_slice());
+        for i in 1..model.bodies.len() {
+            joint_position(model, data, i, q.as_slice());
+        }
+    } else {
         closure::place(model, data, q.as_slice());
-        mass_matrix_at_poses(model, data);
-        return &data.M;
-    }
-    begin(model, data, q.as_slice());
-    for i in 1..model.bodies.len() {
-        joint_position(model, data, i, q.as_slice());
     }
     mass_matrix_at_poses(model, data);
     &data.M
 }
 
-/// As [`mass_matrix`], with the joint poses left in `data` by the last pass of another algorithm.
+/// As [`mass_matrix`], into `data.M`, with the joint poses left in `data` by the last pass of another
+/// algorithm.
 pub fn mass_matrix_at_poses(model: &Model, data: &mut Data) {
     match model.loops.is_empty() {
         true => composite_bodies(model, data),
@@ -323,13 +327,6 @@ fn six<T: Real>(S: &ElasticSubspace<T>, F: &Wrench<T>) -> [T; 6] {
     [f.x, f.y, f.z, t.x, t.y, t.z]
 }
 
-/// [`six`] of six wrenches, one row per coordinate.
-#[inline(always)]
-fn six_by_six<T: Real>(S: &ElasticSubspace<T>, F: &SixWrenches<T>) -> [[T; 6]; 6] {
-    let ([a, b, c], [d, e, f]) = (three_by_six(&S.L, &F.force), three_by_six(&S.B, &F.torque));
-    [a, b, c, d, e, f]
-}
-
 /// `Aᵀ` times three rows of six values.
 #[inline(always)]
 fn three_by_six<T: Real>(A: &Matrix3<T>, rows: &[[T; 6]; 3]) -> [[T; 6]; 3] {
@@ -469,17 +466,19 @@ impl<'m, T: Real> Lower<'m, T> {
             }
             JointMotion::Welded => {}
             JointMotion::Elastic(_) => {
+                // Rows of Sᵀ F: translations Lᵀ f, then angles Bᵀ t.
                 for c in 0..3 {
                     self.put_six(column, row + c, &along(&self::column(&own.S.L, c), &F.force).0);
                     self.put_six(column, row + 3 + c, &along(&self::column(&own.S.B, c), &F.torque).0);
                 }
             }
             JointMotion::Interface { modal, interface } => {
-                let all = six_by_six(&own.S, F);
+                // Φᵀ times Sᵀ F of all six columns.
+                let (tr, rr) = (three_by_six(&own.S.L, &F.force), three_by_six(&own.S.B, &F.torque));
                 for (k, phi) in model.modal[*modal].columns_of(*interface).enumerate() {
                     let mut values = [T::zero(); 6];
-                    for (phi, all) in phi.iter().zip(&all) {
-                        for (value, x) in values.iter_mut().zip(all) {
+                    for (phi, projected) in phi.iter().zip(tr.iter().chain(&rr)) {
+                        for (value, x) in values.iter_mut().zip(projected) {
                             *value += T::splat(*phi) * *x;
                         }
                     }

@@ -3,6 +3,11 @@
 //! [`State`] is small and is copied between steppers; [`Data`] holds results and scratch of all
 //! algorithms, allocated once by [`Data::new`], so that no algorithm allocates. Threads share a
 //! `Model`, each with its own `Data`.
+//!
+//! Below them is what all recursions need of one joint, for any type of joint and scalar: its pose,
+//! twist and bias ([`joint_motion`]), and its motion subspace S times rates and its transpose times a
+//! wrench. P parent, B body behind the joint; everything is at Bo in B axes. Not here: single-DoF
+//! joints ([`AxisMotion`]), mode shapes (`modal`).
 
 use flexarm_spatial::products::{add, cross, lift, lift3, mul, mul3, tr_mul, transposed};
 use flexarm_spatial::{ArticulatedInertia, ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, sin_cos_all};
@@ -84,7 +89,7 @@ pub struct Data<T: Scalar = f64> {
     pub(crate) inverse_d: Vec<f64>,
     pub(crate) u: Vec<f64>,
     /// Caller's external wrenches while those of the balancers are added; empty without balancers.
-    pub(crate) F_held: Vec<Wrench<T>>,
+    pub(crate) F_ext_saved: Vec<Wrench<T>>,
     /// Length or joint value of each balancer at the last poses.
     pub(crate) balanced: Vec<f64>,
     /// One per modal body.
@@ -100,20 +105,35 @@ pub struct Data<T: Scalar = f64> {
 }
 
 impl<T: Real> Data<T> {
-    /// Allocates the workspaces for a model.
+    /// Checks that the workspaces are those of a model of this size.
+    #[track_caller]
+    #[inline]
+    pub(crate) fn check_sizes(&self, model: &Model) {
+        let (bodies, nv) = (model.bodies.len(), model.nv());
+        assert!(
+            self.V.len() == bodies && self.tau.len() == nv,
+            "data has {} bodies and {} coordinates, the model {bodies} and {nv}: each model needs its own Data",
+            self.V.len(),
+            self.tau.len()
+        );
+    }
+
+    /// Allocates the workspaces for a model; poses are identities, all else is zero.
     pub fn new(model: &Model) -> Self {
-        let n = model.bodies.len();
-        let zero = Twist::zeros();
+        let (n, zero) = (model.bodies.len(), Twist::zeros());
         Self {
+            // One entry per body.
             X_PB: vec![identity(); n],
             X_WB: vec![identity(); n],
             V: vec![zero; n],
             A: vec![zero; n],
             F: vec![Wrench::zeros(); n],
             F_ext: vec![Wrench::zeros(); n],
+            // One per independent coordinate.
             tau: DVector::zeros(model.nv()),
             qddot: DVector::zeros(model.nv()),
             M: DMatrix::zeros(model.nv(), model.nv()),
+            // Scratch of the recursions; `single`, `six` and `modal` have one entry per joint of that type.
             elastic: vec![ElasticSubspace { L: Matrix3::identity(), B: Matrix3::identity() }; n],
             bias: vec![zero; n],
             composite: vec![SpatialInertia::lift(&SpatialInertia::zeros()); n],
@@ -125,7 +145,7 @@ impl<T: Real> Data<T> {
             U: vec![Wrench::zeros(); n],
             inverse_d: vec![0.0; n],
             u: vec![0.0; n],
-            F_held: vec![Wrench::zeros(); if model.balancers.is_empty() { 0 } else { n }],
+            F_ext_saved: vec![Wrench::zeros(); if model.balancers.is_empty() { 0 } else { n }],
             balanced: vec![0.0; model.balancers.len()],
             modal: model.modal.iter().map(|m| ModalData::new(&m.tables)).collect(),
             angles: vec![T::zero(); model.turning.len()],
@@ -141,7 +161,8 @@ impl<T: Real> Data<T> {
         self.F_ext.fill(Wrench::zeros());
     }
 
-    /// World pose of a frame, from the last [`crate::forward_kinematics`].
+    /// Returns `X_WF`, the pose of a frame in the world, from the last
+    /// [`crate::forward_kinematics`].
     #[inline(always)]
     pub fn X_WF(&self, frame: &Frame) -> Pose<T> {
         let (X_WB, X_BF) = (&self.X_WB[frame.body], &frame.X_BF);

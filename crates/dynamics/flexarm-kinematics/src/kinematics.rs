@@ -2,11 +2,12 @@
 //!
 //! Frames: W world, B a body, T any frame fixed to a body (usually the tool). `J_WT_W` maps `q̇` to
 //! the twist of T: velocity of the point To and angular velocity, both in **world axes** (rows
-//! linear first).
+//! linear first). Start at [`forward_kinematics`] and [`frame_jacobian`]. Not here: the motion of
+//! one joint (`data`), closed loops (`closure`).
 
 use flexarm_spatial::products::{add, column, cross, lift, mul, mul3, scaled, sub};
 use flexarm_spatial::{ElasticAngles, Real, Twist};
-use nalgebra::{Matrix3, Matrix6xX, Vector3};
+use nalgebra::{DVector, Matrix3, Matrix6xX, Vector3};
 
 use crate::axis_motion::AxisMotion;
 use crate::balancer::measure;
@@ -15,12 +16,14 @@ use crate::data::{Data, State, begin, joint_motion, joint_position, rotor_energy
 use crate::model::{Frame, JointMotion, Model};
 use crate::pose::identity;
 
-/// Computes the poses of all bodies; fills `data.{X_PB, X_WB}`.
+/// Computes the poses of all bodies at coordinates `q` (nv, rad or m); fills `data.{X_PB, X_WB}`
+/// and the lengths of the balancers. O(n), no allocation.
 ///
 /// # Panics
-/// If a vector is not nv long.
-pub fn forward_kinematics(model: &Model, data: &mut Data, q: &nalgebra::DVector<f64>) {
+/// If `q` is not nv long, or `data` is of another model.
+pub fn forward_kinematics(model: &Model, data: &mut Data, q: &DVector<f64>) {
     model.check_size("q", q.len());
+    data.check_sizes(model);
     match model.loops.is_empty() {
         true => place_and_measure(model, data, q.as_slice()),
         false => closure::place(model, data, q.as_slice()),
@@ -41,15 +44,17 @@ pub(crate) fn place_bodies<T: Real>(model: &Model, data: &mut Data<T>, q: &[T]) 
     for i in 1..model.bodies.len() {
         joint_position(model, data, i, q);
     }
-    place_in_world(model, data);
+    world_poses(model, data);
 }
 
-/// Computes poses and twists of all bodies; fills `data.{X_PB, X_WB, V}`.
+/// Computes poses and twists `V_WB_B` of all bodies; fills `data.{X_PB, X_WB, V}` and the lengths of
+/// the balancers. O(n), no allocation.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If a vector is not nv long, or `data` is of another model.
 pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State) {
     state.check_sizes(model);
+    data.check_sizes(model);
     match model.loops.is_empty() {
         true => move_bodies(model, data, state.q.as_slice(), state.qdot.as_slice()),
         false => closure::move_bodies(model, data, state),
@@ -74,14 +79,10 @@ pub(crate) fn move_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64
     measure(model, data, q);
 }
 
-/// Computes world poses from the joint poses left in `data` by the last algorithm.
-pub fn world_poses(model: &Model, data: &mut Data) {
-    place_in_world(model, data);
-}
-
-/// [`world_poses`] for any scalar type.
+/// Computes world poses from the joint poses left in `data.X_PB` by the last algorithm; fills
+/// `data.X_WB`: `X_WB = X_WP X_PB`, from the base outward.
 #[inline(always)]
-pub(crate) fn place_in_world<T: Real>(model: &Model, data: &mut Data<T>) {
+pub fn world_poses<T: Real>(model: &Model, data: &mut Data<T>) {
     data.X_WB[0] = identity();
     for i in 1..model.bodies.len() {
         let (inward, outward) = data.X_WB.split_at_mut(i);
@@ -92,17 +93,27 @@ pub(crate) fn place_in_world<T: Real>(model: &Model, data: &mut Data<T>) {
     }
 }
 
-/// Twist of a frame at its origin in world axes, from the last [`forward_kinematics_velocity`].
+/// Returns `V_WF_W`, the twist of a frame F at its origin in world axes, from the last
+/// [`forward_kinematics_velocity`].
 pub fn frame_twist(data: &Data, frame: &Frame) -> Twist {
     let V = data.V[frame.body].at_child(&frame.X_BF);
     let R = data.X_WB[frame.body].rotation * frame.X_BF.rotation;
     Twist::new(R * V.linear, R * V.angular)
 }
 
-/// Writes `J_WT_W`, 6×nv, from the last [`forward_kinematics`] into `J`.
+/// Writes the Jacobian `J_WT_W`, 6×nv, of a frame T into `J`, from the last [`forward_kinematics`].
+///
+/// ```text
+/// V_WT_W = J q̇,    column of a joint B inward of T: [ l + a × p_BoTo ; a ],  [ l; a ] = R_WB S_B
+/// ```
+/// Columns of coordinates that do not move T are zero. Cost: one pass from T to the base.
 ///
 /// # Panics
 /// If `J` does not have nv columns.
+///
+/// # Source
+/// [Featherstone 2008], section 4.7, with the velocity of the point To instead of that of the point
+/// at the world origin.
 pub fn frame_jacobian(model: &Model, data: &Data, frame: &Frame, J: &mut Matrix6xX<f64>) {
     assert_eq!(J.ncols(), model.nv(), "the Jacobian needs one column per coordinate");
     tree_jacobian(model, data, frame, J.as_mut_slice(), |k, column, J| {
@@ -202,9 +213,10 @@ pub(crate) fn turned<T: Real>(motion: AxisMotion, R_WB: &Matrix3<T>, ratio: f64)
     )
 }
 
-/// Writes `dJ_WT_W/dt`, 6×nv, from the last [`forward_kinematics_velocity`] at `state` into `Jdot`.
+/// Writes `J̇ = dJ_WT_W/dt`, 6×nv, into `Jdot`, from the last [`forward_kinematics_velocity`] at
+/// `state`.
 ///
-/// `A_WT = J q̈ + J̇ q̇` is the acceleration of the point To and the angular acceleration, in world
+/// `A_WT_W = J q̈ + J̇ q̇` is the acceleration of the point To and the angular acceleration, in world
 /// axes.
 ///
 /// # Panics
@@ -258,9 +270,9 @@ pub(crate) fn joint_column_rates(
     qdot: &[f64],
     mut add: impl FnMut(usize, [Vector3<f64>; 4]),
 ) {
+    // Columns fixed in B axes rotate with B, those fixed in P axes with P.
     let (body, zero) = (&model.bodies[i], Vector3::zeros());
     match body.motion {
-        // A column fixed in B axes rotates with B.
         JointMotion::Axis(motion) => {
             let Twist { linear: l, angular: a } = turned(motion, R, body.ratio);
             add(body.coordinate, [l, a, w_B.cross(&l), w_B.cross(&a)]);

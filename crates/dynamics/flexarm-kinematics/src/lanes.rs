@@ -1,7 +1,8 @@
 //! Recursions over several poses of one tree at once, in the lanes of a SIMD scalar type.
 //!
-//! Poses differ between lanes; the rest is that of one [`Model`]. Every lane gives bitwise the result of the `f64` function of the
-//! same name. Functions are inlined into their callers, so that the SIMD instructions are available
+//! Poses differ between lanes; the rest is that of one [`Model`]. Every lane gives bitwise the result
+//! of the `f64` function of the same name, for trees without balancers and closed loops. Functions are
+//! inlined into their callers, so that the SIMD instructions are available
 //! ([`flexarm_spatial::lanes::with_lanes`]).
 
 use flexarm_spatial::Real;
@@ -68,5 +69,5 @@ pub fn static_tangent<T: Real>(
     model.check_size("q", q.len());
     let n = tangent.size(model);
     assert_eq!(G.len(), n * n, "a row and a column per coordinate");
-    tangent.of_bodies(model, data, q, std::iter::once(load), G);
+    tangent.under_load(model, data, q, &load, G);
 }

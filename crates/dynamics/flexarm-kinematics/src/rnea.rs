@@ -8,7 +8,8 @@
 //! Inward pass:
 //!   τ_B   = S_Bᵀ F_B,   F_P += Ad_BPᵀ F_B                  (4)
 //! ```
-//! `Ṡ_B` is the time derivative of S in B axes: zero for single-DoF joints, but not for elastic
+//! All functions include balancers and closed loops; the recursion itself, [`newton_euler`], knows
+//! only the tree. `Ṡ_B` is the time derivative of S in B axes: zero for single-DoF joints, but not for elastic
 //! ones. A modal body adds its inertia forces to (3) and to the forces of its coordinates, see
 //! [`crate::ModalBody`].
 
@@ -29,7 +30,7 @@ use crate::model::Model;
 /// `data.{X_PB, V, A, F, tau}`; `A` has gravity subtracted. O(n), no allocation.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If a vector is not nv long, or `data` is of another model.
 ///
 /// # Source
 /// [Featherstone 2008], Table 5.1.
@@ -41,6 +42,7 @@ pub fn inverse_dynamics<'d>(
 ) -> &'d DVector<f64> {
     state.check_sizes(model);
     model.check_size("qddot", qddot.len());
+    data.check_sizes(model);
     let (q, qdot, qddot) = (state.q.as_slice(), state.qdot.as_slice(), qddot.as_slice());
     match model.loops.is_empty() {
         true => balanced(model, data, q, qdot, Some(qddot)),
@@ -49,13 +51,15 @@ pub fn inverse_dynamics<'d>(
     &data.tau
 }
 
-/// Computes generalised forces at zero acceleration: Coriolis, centrifugal, gravity, balancers and
-/// external loads.
+/// Computes the generalised forces `bias(q, q̇)` (N m or N), nv, at zero acceleration: Coriolis,
+/// centrifugal, gravity, balancers and external loads. Fills the same fields as
+/// [`inverse_dynamics`], at the same cost.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If a vector is not nv long, or `data` is of another model.
 pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -> &'d DVector<f64> {
     state.check_sizes(model);
+    data.check_sizes(model);
     let (q, qdot) = (state.q.as_slice(), state.qdot.as_slice());
     match model.loops.is_empty() {
         true => balanced(model, data, q, qdot, None),
@@ -64,13 +68,14 @@ pub fn nonlinear_effects<'d>(model: &Model, data: &'d mut Data, state: &State) -
     &data.tau
 }
 
-/// Computes the generalised forces that hold the mechanism static at `q`, against gravity,
-/// balancers and external loads.
+/// Computes the generalised forces (N m or N), nv, that keep the mechanism static at `q`, against
+/// gravity, balancers and external loads. Fills `data.{X_PB, F, tau}`; O(n), no allocation.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If `q` is not nv long, or `data` is of another model.
 pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
     model.check_size("q", q.len());
+    data.check_sizes(model);
     if model.loops.is_empty() {
         begin(model, data, q.as_slice());
         for i in 1..model.bodies.len() {
@@ -84,9 +89,10 @@ pub fn gravity_forces<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -
 /// `q`.
 ///
 /// # Panics
-/// If a vector is not nv long.
+/// If `q` is not nv long, or `data` is of another model.
 pub fn gravity_forces_at_poses<'d>(model: &Model, data: &'d mut Data, q: &DVector<f64>) -> &'d DVector<f64> {
     model.check_size("q", q.len());
+    data.check_sizes(model);
     match (model.loops.is_empty(), model.balancers.is_empty()) {
         (true, true) => at_rest(model, data),
         (true, false) => {
@@ -110,7 +116,7 @@ pub(crate) fn at_rest<T: Real>(model: &Model, data: &mut Data<T>) {
     for i in 0..n {
         let body = &model.bodies[i];
         if i > 0 {
-            // (2) and (3)
+            // (2) and (3) without velocities: A = R_PBᵀ a_P, F = [m A; h × A] - F_ext.
             let a = tr_mul(data.X_PB[i].rotation.matrix(), &data.A[body.parent].linear);
             let inertia = SpatialInertia::lift(&model.bodies[i].inertia);
             data.A[i] = Twist::new(a, Vector3::zeros());

@@ -28,10 +28,11 @@
 //! line:  ∂τ_i/∂q_j += d_i · K d_j        joint:  ∂τ_i/∂q_j += c_i k c_j                    (7)
 //! ```
 //! Cost: one pass over the bodies and one over the pairs of coordinates; central differences of
-//! [`crate::gravity_forces`] take 2 n passes over the bodies.
+//! [`crate::gravity_forces`] take 2 n passes over the bodies. Start at [`StaticTangent::compute`]. Not
+//! here: springs, and the reduction to independent coordinates of closed loops (`closure`).
 
 use flexarm_spatial::products::{add, add3, column as column_of, cross, cross3, dot, lift, mul, scaled, sub, tr_mul};
-use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench};
+use flexarm_spatial::{ElasticAngles, Pose, Real, SpatialInertia, Twist, Wrench, skew};
 use nalgebra::{DMatrix, DVector, Matrix3, Scalar, Vector3};
 
 use crate::balancer::{BalancerLine, BalancerPlace};
@@ -60,6 +61,7 @@ pub struct StaticTangent<T: Scalar = f64> {
     columns: Vec<Column<T>>,
     /// Per body: weight and loads on its subtree, and their derivatives.
     carried: Vec<Carried<T>>,
+    /// `R C_t,k × g` in (6), one per coordinate of the widest modal body.
     g: Vec<Vector3<T>>,
     /// Closed loops: tangent of the tree; `tau_d` holds the forces on the dependent coordinates.
     loops: Option<Box<LoopTangent>>,
@@ -76,6 +78,7 @@ struct Column<T: Scalar = f64> {
     /// coordinate, for joints with angles.
     t: Vector3<f64>,
     phi: Vector3<f64>,
+    /// `s = [v; w]`.
     v: Vector3<T>,
     w: Vector3<T>,
     /// `T s` in (3).
@@ -100,7 +103,7 @@ impl<T: Real> Carried<T> {
     /// Force of constant direction at the point c.
     #[inline(always)]
     fn weight(f: Vector3<T>, c: &Vector3<T>) -> Self {
-        Self { f, n: cross(c, &f), A: zeros(), N: arm_turns(c, &f) }
+        Self { f, n: cross(c, &f), A: Matrix3::zeros(), N: moved_moment(c, &f) }
     }
 
     #[inline(always)]
@@ -112,15 +115,9 @@ impl<T: Real> Carried<T> {
     }
 }
 
-#[inline(always)]
-fn zeros<T: Real>() -> Matrix3<T> {
-    let zero = T::zero();
-    Matrix3::new(zero, zero, zero, zero, zero, zero, zero, zero, zero)
-}
-
 /// `(w × r) × f` as a matrix on w: `r fᵀ - (r · f) 1`.
 #[inline(always)]
-fn arm_turns<T: Real>(r: &Vector3<T>, f: &Vector3<T>) -> Matrix3<T> {
+fn moved_moment<T: Real>(r: &Vector3<T>, f: &Vector3<T>) -> Matrix3<T> {
     let s = dot(r, f);
     Matrix3::new(
         r.x * f.x - s,
@@ -135,13 +132,6 @@ fn arm_turns<T: Real>(r: &Vector3<T>, f: &Vector3<T>) -> Matrix3<T> {
     )
 }
 
-/// `w × a` as a matrix on w.
-#[inline(always)]
-fn turned<T: Real>(a: &Vector3<T>) -> Matrix3<T> {
-    let zero = T::zero();
-    Matrix3::new(zero, a.z, -a.y, -a.z, zero, a.x, a.y, -a.x, zero)
-}
-
 impl PointLoad {
     /// W and T of (2).
     #[inline(always)]
@@ -151,15 +141,16 @@ impl PointLoad {
         let mut carried = Carried::weight(f, &p);
         carried.n = add(&carried.n, &m);
         if self.turns {
-            carried.A = turned(&f);
-            carried.N = add3(&carried.N, &add3(&turned(&m), &cross3(&p, &carried.A)));
+            // w × f and w × m as matrices on w.
+            carried.A = skew(&-f);
+            carried.N = add3(&carried.N, &add3(&skew(&-m), &cross3(&p, &carried.A)));
         }
         carried
     }
 }
 
 impl<T: Real> StaticTangent<T> {
-    /// Number of rows and columns of the matrix.
+    /// Number of rows and columns of the matrix over the independent coordinates.
     pub(crate) fn size(&self, model: &Model) -> usize {
         model.nv() - self.first
     }
@@ -167,6 +158,8 @@ impl<T: Real> StaticTangent<T> {
     /// Creates the workspace for the coordinates from `first` on: 0 for all, [`Model::n_actuated`]
     /// for the elastic ones.
     pub fn new(model: &Model, first: usize) -> Self {
+        // One column per coordinate and joint that it moves, in body order; a unit of the coordinate
+        // moves the joint by t and turns it by φ.
         let mut columns = Vec::new();
         let (zero, nothing) = (Vector3::zeros(), Vector3::from_element(T::zero()));
         let column = |k: usize, body: usize, t: Vector3<f64>, phi: Vector3<f64>| Column {
@@ -201,6 +194,7 @@ impl<T: Real> StaticTangent<T> {
                 }
             }
         }
+        // Workspaces; with closed loops also for the tree with all its coordinates.
         let widest = model.modal.iter().map(|modal| modal.n).max().unwrap_or(0);
         let loops = (!model.loops.is_empty()).then(|| Box::new(LoopTangent::new(model, first)));
         let tau_d = vec![0.0; model.dependent().len()];
@@ -208,22 +202,19 @@ impl<T: Real> StaticTangent<T> {
         Self { first, columns, carried, g: vec![nothing; widest], loops, tau_d }
     }
 
-    /// [`StaticTangent::compute`] without balancers and loops; `G` is stored column by column.
+    /// [`StaticTangent::compute`] under one load, without balancers and loops; `G` is stored column by
+    /// column.
     #[inline(always)]
-    pub(crate) fn of_bodies(
-        &mut self,
-        model: &Model,
-        data: &Data<T>,
-        q: &[T],
-        loads: impl Iterator<Item = PointLoad>,
-        G: &mut [T],
-    ) {
+    pub(crate) fn under_load(&mut self, model: &Model, data: &Data<T>, q: &[T], load: &PointLoad, G: &mut [T]) {
         G.fill(T::zero());
         self.carry_weights(model, data);
-        for load in loads {
-            self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
-        }
+        self.carry_load(data, load);
         self.finish(model, data, q, G);
+    }
+
+    #[inline(always)]
+    fn carry_load(&mut self, data: &Data<T>, load: &PointLoad) {
+        self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
     }
 
     /// W and T of (2) for the weight of each body.
@@ -343,7 +334,7 @@ impl<T: Real> StaticTangent<T> {
             let n_B = tr_mul(R, &sub(&self.carried[i].n, &cross(&X_WB.translation.vector, f)));
             // (t_j × w_i) · f = t_j · (w_i × f)
             let f_B = tr_mul(R, f);
-            let (mut turns, mut slides) = (zeros(), zeros());
+            let (mut turns, mut slides) = (Matrix3::zeros(), Matrix3::zeros());
             for c in 0..3 {
                 let (unit, w_B) = (lift(&Vector3::ith(c, 1.0)), column_of(&S.B, c));
                 let dB = angles.rate_map_derivative(&phi, &unit);
@@ -389,14 +380,17 @@ impl<T: Real> StaticTangent<T> {
 }
 
 impl StaticTangent {
-    /// Computes `∂τ/∂q` of the forces that hold the mechanism static under gravity and `loads`,
-    /// without springs. `G` is (n - first)×(n - first) and overwritten. It is symmetric unless a
-    /// load has a moment or rotates with its body. Does not allocate.
+    /// Computes `∂τ/∂q` of the forces that keep the mechanism static under gravity, `loads` and
+    /// balancers, without springs, into `G` (N/m, N, N m/rad), (nv - first)×(nv - first). It is
+    /// symmetric unless a load has a moment or rotates with its body. Does not allocate.
     ///
-    /// * `data`: after [`crate::forward_kinematics`] at `q`.
+    /// * `data`: after [`crate::forward_kinematics`] at `q` (nv).
     ///
     /// # Panics
     /// If the size of `G` does not match, or `q` is not nv long.
+    ///
+    /// # Source
+    /// Theory page, section on statics; (1) to (7) of `static_tangent.rs`.
     pub fn compute(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
         let n = self.size(model);
         assert_eq!(G.shape(), (n, n), "a row and a column per coordinate");
@@ -415,19 +409,22 @@ impl StaticTangent {
     /// Adds to `dtau` the change of the static forces on the coordinates from the first one on, as
     /// the subtree of a body moves with a twist (world axes, about the world origin) while all
     /// coordinates keep their values: (3) and (4) with the body's joint frame as another joint; closed
-    /// loops follow. Returns the twist of the body `seen`. Call [`StaticTangent::compute`] before.
+    /// loops follow. Call [`StaticTangent::compute`] before.
+    ///
+    /// Returns the twist of the body `observed`, in world axes about the world origin.
     ///
     /// # Panics
-    /// If the model has balancers.
+    /// If the model has balancers, or `dtau` is not nv - first long.
     pub fn add_moved_subtree(
         &mut self,
         model: &Model,
         data: &Data,
         (body, moved): (usize, &Twist),
-        seen: usize,
+        observed: usize,
         dtau: &mut [f64],
     ) -> Twist {
-        let mut twist = if model.is_in_subtree(seen, body) { *moved } else { Twist::zeros() };
+        assert_eq!(dtau.len(), self.size(model), "one change of force per coordinate of the tangent");
+        let mut twist = if model.is_in_subtree(observed, body) { *moved } else { Twist::zeros() };
         let Some(mut tangent) = self.loops.take() else {
             self.add_moved_in_tree(model, data, body, moved, dtau);
             return twist;
@@ -437,7 +434,7 @@ impl StaticTangent {
         let forces = (&self.tau_d[..], &mut dtree[..]);
         let rates = tangent.add_moved_subtree(model, data, self.first, (body, moved), forces, dtau);
         let n = self.size(model);
-        for column in self.columns.iter().filter(|column| column.k >= n && model.is_in_subtree(seen, column.body)) {
+        for column in self.columns.iter().filter(|column| column.k >= n && model.is_in_subtree(observed, column.body)) {
             let rate = rates[column.k - n];
             twist += Twist::new(column.v * rate, column.w * rate);
         }
@@ -448,6 +445,7 @@ impl StaticTangent {
     /// [`Self::add_moved_subtree`] over all coordinates of the opened tree.
     fn add_moved_in_tree(&self, model: &Model, data: &Data, body: usize, moved: &Twist, dtau: &mut [f64]) {
         assert!(model.balancers.is_empty(), "balancers are not covered");
+        // Coordinates behind the body by (4), those before it by (3).
         let (v, w, end) = (&moved.linear, &moved.angular, model.bodies[body].subtree_end);
         let Carried { f, A, N, .. } = &self.carried[body];
         let (force, moment) = (A * w, N * w + v.cross(f));
@@ -458,6 +456,7 @@ impl StaticTangent {
                 dtau[column.k] -= column.v.dot(&force) + column.w.dot(&moment);
             }
         }
+        // Modal coordinates behind the body by (6).
         let behind =
             model.modal.iter().filter(|entry| (body..end).contains(&entry.body) && entry.coordinate >= self.first);
         for entry in behind {
@@ -468,52 +467,19 @@ impl StaticTangent {
         }
     }
 
-    /// As [`StaticTangent::compute`], for loads and balancers only, without gravity; for trees
-    /// without closed loops and modal bodies.
-    ///
-    /// # Panics
-    /// If the size of `G` does not match, or `q` is not nv long.
-    pub fn of_loads(
-        &mut self,
-        model: &Model,
-        data: &Data,
-        q: &DVector<f64>,
-        loads: &[PointLoad],
-        G: &mut DMatrix<f64>,
-    ) {
-        let n = self.size(model);
-        assert_eq!(G.shape(), (n, n), "a row and a column per coordinate");
-        model.check_size("q", q.len());
-        G.fill(0.0);
-        self.carried.fill(Carried::weight(Vector3::zeros(), &Vector3::zeros()));
-        self.carry_loads(model, data, loads.iter().copied());
-        self.finish(model, data, q.as_slice(), G.as_mut_slice());
-        self.add_balancers(model, data, G);
-    }
-
     /// [`StaticTangent::compute`] over all coordinates of the opened tree.
     fn of_tree(&mut self, model: &Model, data: &Data, q: &DVector<f64>, loads: &[PointLoad], G: &mut DMatrix<f64>) {
-        let loads = loads.iter().copied();
-        if model.balancers.is_empty() {
-            return self.of_bodies(model, data, q.as_slice(), loads, G.as_mut_slice());
-        }
         G.as_mut_slice().fill(0.0);
         self.carry_weights(model, data);
-        self.carry_loads(model, data, loads);
-        self.finish(model, data, q.as_slice(), G.as_mut_slice());
-        self.add_balancers(model, data, G);
-    }
-
-    /// Adds loads and the forces at both ends of line balancers.
-    fn carry_loads(&mut self, model: &Model, data: &Data, loads: impl Iterator<Item = PointLoad>) {
-        for load in loads {
-            self.carried[load.body].add(&load.carried(&data.X_WB[load.body]));
-        }
+        loads.iter().for_each(|load| self.carry_load(data, load));
+        // Forces at both ends of line balancers.
         for line in model.balancers.iter().filter_map(|balancer| balancer.line(&data.X_WB)) {
             for (end, F_W) in [line.F_W, -line.F_W].into_iter().enumerate() {
                 self.carried[line.bodies[end]].add(&Carried::weight(F_W, &line.p_W[end]));
             }
         }
+        self.finish(model, data, q.as_slice(), G.as_mut_slice());
+        self.add_balancers(model, data, G);
     }
 
     /// Adds (7).
@@ -538,6 +504,7 @@ impl StaticTangent {
         }
     }
 
+    /// (7) of one line balancer: `d_i · K d_j` over all pairs of coordinates.
     fn add_line(&mut self, model: &Model, line: &BalancerLine, G: &mut DMatrix<f64>) {
         for column in &mut self.columns {
             let moves = |body: usize| column.body <= body && body < model.bodies[column.body].subtree_end;

@@ -13,7 +13,7 @@ use crate::model::Model;
 pub(crate) fn with_lines(model: &Model, data: &mut Data, q: &[f64], run: impl FnOnce(&mut Data)) {
     place_bodies(model, data, q);
     measure(model, data, q);
-    data.F_held.copy_from_slice(&data.F_ext);
+    data.F_ext_saved.copy_from_slice(&data.F_ext);
     for balancer in &model.balancers {
         let Some(line) = balancer.line(&data.X_WB) else { continue };
         for (end, F_W) in [line.F_W, -line.F_W].into_iter().enumerate() {
@@ -23,7 +23,7 @@ pub(crate) fn with_lines(model: &Model, data: &mut Data, q: &[f64], run: impl Fn
         }
     }
     run(data);
-    data.F_ext.copy_from_slice(&data.F_held);
+    data.F_ext.copy_from_slice(&data.F_ext_saved);
 }
 
 /// `τ += factor c T`, (3): with factor 1 the forces that hold the joints against their balancers.

@@ -1,4 +1,7 @@
 //! Parts of the tree: bodies with their joints, modal bodies, named frames and coordinates.
+//!
+//! P is the parent of body B, J the frame of the joint between them, fixed to P; at zero coordinate B
+//! and J coincide. Not here: their construction (`builder`), their numbers (`numbering`).
 
 use std::ops::Range;
 use std::slice::ChunksExact;

@@ -1,4 +1,8 @@
 //! Construction of the tree from a mechanism: bodies and frames, coordinates, loops, rotors.
+//!
+//! Start at [`Model::new`]. [`Builder::grow`] walks the tree and lumps links on fixed joints into the
+//! body that carries them; [`Builder::finish`] numbers the coordinates and fills the lists of the
+//! [`Model`]. Not here: checks of names and inertias (`check`), assembly of closed loops (`closure`).
 
 use std::collections::HashMap;
 
@@ -23,6 +27,7 @@ impl Model {
     /// # Errors
     /// [`ModelError`] with the names of the invalid links or joints.
     pub fn new(mechanism: &Mechanism) -> Result<Self, ModelError> {
+        // Names, connectivity and gravity; inertias are checked link by link.
         let base = check_tree(mechanism)?;
         let gravity = Quantity::ACCELERATION.check_all("gravity", &mechanism.gravity);
         gravity.map_err(|what| out_of_range("mechanism", &mechanism.name, what))?;
@@ -35,6 +40,7 @@ impl Model {
             followers: Vec::new(),
             modal: Vec::new(),
         };
+        // Body 0, the world, has the base link and no joint.
         let world = &mechanism.links[base];
         build.bodies.push(Body {
             name: world.name.clone(),
@@ -139,7 +145,10 @@ impl<'a> Builder<'a> {
             (_, Some(motion)) => JointMotion::Axis(motion),
             (JointKind::Elastic(angles), _) => JointMotion::Elastic(angles),
             (JointKind::Interface(interface), _) => match self.bodies[body].modal {
-                Some(modal) if modal_has(&self.modal[modal], interface) && self.frames_are_at(body, &link.name) => {
+                Some(modal)
+                    if interface < self.modal[modal].tables.shapes.interfaces.len()
+                        && self.frames_are_at(body, &link.name) =>
+                {
                     JointMotion::Interface { modal, interface }
                 }
                 _ => {
@@ -206,6 +215,7 @@ impl<'a> Builder<'a> {
     /// Numbers the coordinates, connects mimic joints and interfaces to theirs, and builds the
     /// model.
     fn finish(mut self) -> Result<Model, ModelError> {
+        // Coordinates: independent ones, those of mimic joints and interfaces, then dependent ones.
         let drafts = draft_loops(self.mechanism, &self.frames, &self.bodies)?;
         let followers: Vec<usize> = drafts.iter().flat_map(LoopDraft::dependent).collect();
         let Numbering { coordinates, elastic, n_actuated } = self.number(&followers);
@@ -220,6 +230,7 @@ impl<'a> Builder<'a> {
         let dependent = self.number_dependent(&followers, coordinates.len());
         let nv = coordinates.len();
         let loops = drafts.iter().map(|d| d.placed(&self.bodies, nv, |modal| self.modal[modal].n)).collect();
+        // Lists of the recursions: subtrees, joints by type, rotors, balancers.
         self.close_subtrees();
         let (single, six) = self.list_columns();
         let turns = |b: &Body| matches!(b.motion, JointMotion::Axis(motion) if !motion.slides());
@@ -254,6 +265,7 @@ impl<'a> Builder<'a> {
             rotor_couplings,
             gravity: self.mechanism.gravity,
         };
+        // Assembly modes of the loops, which need the forward kinematics of the model.
         assemble(&mut model, self.mechanism)?;
         Ok(model)
     }
@@ -281,6 +293,3 @@ impl<'a> Builder<'a> {
     }
 }
 
-fn modal_has(modal: &Modal, interface: usize) -> bool {
-    interface < modal.tables.shapes.interfaces.len()
-}

@@ -1,4 +1,7 @@
 //! Checks of a mechanism: names, parents, connectivity, and inertias.
+//!
+//! [`check_tree`] and [`check_inertia`] return the first fault as a [`ModelError`] with the names of
+//! the parts. Not here: loops (`closure`), balancers (`balancer`), modal bodies (`builder`).
 
 use std::collections::{HashMap, HashSet};
 
@@ -44,14 +47,14 @@ pub(super) fn check_tree(mechanism: &Mechanism) -> Result<usize, ModelError> {
     let roots: Vec<usize> =
         (0..mechanism.links.len()).filter(|&i| parent_of[mechanism.links[i].name.as_str()].is_none()).collect();
     let children = children_of_links(mechanism);
-    let mut reached: HashMap<&str, ()> = HashMap::new();
+    let mut reached: HashSet<&str> = HashSet::new();
     let mut open: Vec<&str> = roots.iter().map(|&i| mechanism.links[i].name.as_str()).collect();
     while let Some(link) = open.pop() {
-        reached.insert(link, ());
+        reached.insert(link);
         open.extend(children.get(link).into_iter().flatten().map(|j| j.child.as_str()));
     }
     let names = mechanism.links.iter().map(|link| link.name.as_str());
-    let looped: Vec<&str> = names.filter(|name| !reached.contains_key(name)).collect();
+    let looped: Vec<&str> = names.filter(|name| !reached.contains(name)).collect();
     if !looped.is_empty() {
         return Err(ModelError::Structure(format!("links {looped:?} form a loop: open it at one joint")));
     }

@@ -130,7 +130,7 @@ impl Model {
     ///
     /// # Panics
     /// If there is no body `of`.
-    pub fn is_in_subtree(&self, body: usize, of: usize) -> bool {
+    pub(crate) fn is_in_subtree(&self, body: usize, of: usize) -> bool {
         (of..self.bodies[of].subtree_end).contains(&body)
     }
 

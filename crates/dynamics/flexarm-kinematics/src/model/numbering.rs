@@ -1,4 +1,8 @@
 //! Numbering of the coordinates: actuated, elastic, dependent; and those shared by several joints.
+//!
+//! The order is that of [`crate::Model`]: actuated joints in tree order or in that of
+//! `coordinate_order`, elastic joints and modal bodies proximal to distal, joints that follow from
+//! closed loops.
 
 use std::collections::HashMap;
 
