@@ -1,4 +1,6 @@
 //! Split of the TCP error into its static part and the part due to motion.
+//!
+//! World axes, SI units. Not here: the static part itself (`flexarm-run`).
 
 use nalgebra::Vector3;
 
@@ -49,22 +51,62 @@ pub fn error_parts(times: &[f64], errors: &[[f64; 6]], statics: &[[f64; 3]]) -> 
     if let Some(index) = statics.iter().position(|s| s.iter().any(|x| !x.is_finite())) {
         return Err(RecordError::NotFinite { what: "statics", index });
     }
-    let error = |i: usize| Vector3::new(errors[i][0], errors[i][1], errors[i][2]);
-    let resting = |i: usize| Vector3::from(statics[i]);
-    let largest =
-        |of: &dyn Fn(usize) -> f64| (1..n).fold((0, of(0)), |best, i| if of(i) > best.1 { (i, of(i)) } else { best });
-    let (peak, size) = largest(&|i| error(i).norm());
-    let (_, static_peak_m) = largest(&|i| resting(i).norm());
-    let (moving, dynamic_peak_m) = largest(&|i| (error(i) - resting(i)).norm());
-    let static_at_peak_m = if size > 0.0 { resting(peak).dot(&error(peak)) / size } else { 0.0 };
-    let squares = |i: usize| (error(i) - resting(i)).norm_squared();
-    let area: f64 = (1..n).map(|i| 0.5 * (squares(i - 1) + squares(i)) * (times[i] - times[i - 1])).sum();
-    Ok(ErrorParts {
-        static_at_peak_m,
-        dynamic_at_peak_m: size - static_at_peak_m,
-        static_peak_m,
-        dynamic_peak_m,
-        t_dynamic_peak_s: times[moving],
-        dynamic_rms_m: if n > 1 { (area / (times[n - 1] - times[0])).sqrt() } else { squares(0).sqrt() },
-    })
+    let mut totals = StaticTotals::default();
+    for ((t, e), s) in times.iter().zip(errors).zip(statics) {
+        totals.add(*t, Vector3::new(e[0], e[1], e[2]), (*s).into());
+    }
+    Ok(totals.parts())
+}
+
+/// Figures of the static part `s` and of the dynamic part `d = e - s` of the samples so far.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct StaticTotals {
+    count: usize,
+    start_s: f64,
+    last_s: f64,
+    /// `|e|` and `s·e` at the maximum error.
+    peak: (f64, f64),
+    static_peak_m: f64,
+    /// Time and magnitude.
+    dynamic_peak: (f64, f64),
+    /// Square of `d` in the last sample, and its integral.
+    last: f64,
+    area: f64,
+}
+
+impl StaticTotals {
+    /// Adds a sample of the error `e` and its static part `s`.
+    pub(crate) fn add(&mut self, time_s: f64, e: Vector3<f64>, s: Vector3<f64>) {
+        let (is_first, d) = (self.count == 0, e - s);
+        if is_first || e.norm() > self.peak.0 {
+            self.peak = (e.norm(), s.dot(&e));
+        }
+        self.static_peak_m = if is_first { s.norm() } else { self.static_peak_m.max(s.norm()) };
+        if is_first || d.norm() > self.dynamic_peak.1 {
+            self.dynamic_peak = (time_s, d.norm());
+        }
+        let square = d.norm_squared();
+        if is_first {
+            self.start_s = time_s;
+        } else {
+            self.area += 0.5 * (self.last + square) * (time_s - self.last_s);
+        }
+        (self.last_s, self.last) = (time_s, square);
+        self.count += 1;
+    }
+
+    /// Returns the figures.
+    pub(crate) fn parts(&self) -> ErrorParts {
+        let (size, along) = self.peak;
+        let static_at_peak_m = if size > 0.0 { along / size } else { 0.0 };
+        let mean_square = if self.count > 1 { self.area / (self.last_s - self.start_s) } else { self.last };
+        ErrorParts {
+            static_at_peak_m,
+            dynamic_at_peak_m: size - static_at_peak_m,
+            static_peak_m: self.static_peak_m,
+            dynamic_peak_m: self.dynamic_peak.1,
+            t_dynamic_peak_s: self.dynamic_peak.0,
+            dynamic_rms_m: mean_square.sqrt(),
+        }
+    }
 }

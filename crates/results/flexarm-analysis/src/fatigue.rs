@@ -1,4 +1,7 @@
 //! Fatigue: rainflow counting of a stress history, and damage by an S-N curve.
+//!
+//! Start at [`rainflow_repeating`] and [`SnCurve::damage`]. Not here: the stress history and the
+//! strengths of materials (`flexarm-run`).
 
 /// Cycle of a history.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,15 +16,19 @@ pub struct FatigueCycle {
 
 /// Counts the cycles of a history by the rainflow method.
 ///
-/// Cycles that contain the first point are half cycles, and so is what is left at the end.
+/// * `history`: successive values, any unit, finite.
+///
+/// Returns the cycles in the order in which they close. Cycles that contain the first point are half
+/// cycles, and so is what is left at the end.
 ///
 /// # Source
-/// ASTM E1049-85, section 5.4.4.
+/// [ASTM E1049], section 5.4.4.
 pub fn rainflow(history: &[f64]) -> Vec<FatigueCycle> {
     let mut cycles = Vec::new();
     let mut points: Vec<f64> = Vec::new();
     for point in reversals(history) {
         points.push(point);
+        // The range Y = |b - a| is a cycle once the range X = |c - b| after it is not smaller.
         while let [.., a, b, c] = points[..] {
             if (c - b).abs() < (b - a).abs() {
                 break;
@@ -45,7 +52,7 @@ pub fn rainflow(history: &[f64]) -> Vec<FatigueCycle> {
 /// one, so that every cycle is whole.
 ///
 /// # Source
-/// ASTM E1049-85, section 5.4.5.
+/// [ASTM E1049], section 5.4.5.
 pub fn rainflow_repeating(history: &[f64]) -> Vec<FatigueCycle> {
     let top = (0..history.len()).max_by(|a, b| history[*a].total_cmp(&history[*b]));
     let Some(top) = top else { return Vec::new() };
@@ -97,7 +104,7 @@ impl SnCurve {
     /// cycles count little, but they count.
     ///
     /// # Source
-    /// Haibach (2006), *Betriebsfestigkeit*, section 3.2.
+    /// [Haibach 2006], section 3.2.
     pub fn damage(&self, cycles: &[FatigueCycle]) -> f64 {
         let of_one = |cycle: &FatigueCycle| {
             let reserve = 1.0 - cycle.mean.max(0.0) / self.tensile_pa;

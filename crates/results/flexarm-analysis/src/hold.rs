@@ -1,5 +1,8 @@
 //! Figures of the TCP error after a move, while the joints hold: final value, settling, overshoot,
 //! ringing.
+//!
+//! Start at `Hold::metrics`. World axes, SI units. Not here: the search for holds (`metrics`), spectral
+//! lines (`spectrum`).
 
 use std::f64::consts::PI;
 
@@ -41,7 +44,7 @@ pub struct HoldMetrics {
 
 /// Returns whether a line is significant: far below the settling band (m) it neither delays
 /// settling nor counts as vibration.
-pub(crate) fn is_seen(line: &SpectralLine, band_m: f64) -> bool {
+pub(crate) fn is_significant(line: &SpectralLine, band_m: f64) -> bool {
     line.amplitude > 1e-6 * band_m
 }
 
@@ -63,7 +66,7 @@ impl Hold<'_> {
     /// Computes the figures; `start_s` may be before the first sample.
     pub(crate) fn metrics(&self, start_s: f64, band_m: f64) -> HoldMetrics {
         let line = strongest_line(self.times, &self.errors, Taper::FadeOut);
-        let line = line.filter(|line| is_seen(line, band_m));
+        let line = line.filter(|line| is_significant(line, band_m));
         let final_error = self.final_static.unwrap_or_else(|| self.resting_value(line));
         HoldMetrics {
             start_s,

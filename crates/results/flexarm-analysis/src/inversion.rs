@@ -211,11 +211,12 @@ impl Inversion {
         for order in 1..ORDER {
             derivatives.push(derivative(&derivatives[order - 1], step_s));
         }
+        // Σ A_i y⁽ⁱ⁾ of the series `terms`, for `count` columns from `first`.
         let of = |terms: fn(&Series) -> &[DMatrix<f64>; ORDER], rows: usize, first: usize, count: usize| {
             let mut sum = DMatrix::zeros(rows, count);
             for column in 0..count {
                 let time = (first + column) as f64 - pad as f64;
-                for (node, weight) in self.place(time * step_s) {
+                for (node, weight) in self.nodes_at(time * step_s) {
                     for (A, y) in terms(&self.series[node]).iter().zip(&derivatives) {
                         sum.column_mut(column).gemv(weight, A, &y.column(first + column), 1.0);
                     }
@@ -228,7 +229,7 @@ impl Inversion {
             // Starts before the motion begins, so that it is reached at rest.
             let torques = of(|series| &series.torques, servo.axes.len(), 0, pad + N);
             let at =
-                |column: usize| NodeServo::between(&self.servos, self.place((column as f64 - pad as f64) * step_s));
+                |column: usize| NodeServo::between(&self.servos, self.nodes_at((column as f64 - pad as f64) * step_s));
             let ahead = NodeServo::leads(at, &torques, step_s);
             for (i, axis) in servo.axes.iter().enumerate() {
                 let mut row = u.row_mut(*axis);
@@ -258,23 +259,15 @@ impl Inversion {
     /// Indices of the nodes around a time with their weights, those of a cubic B-spline:
     /// interpolated quantities have no kink at a node, so commands have no velocity jump there. At
     /// the ends it is even.
-    fn place(&self, t: f64) -> [(usize, f64); 4] {
+    fn nodes_at(&self, t: f64) -> [(usize, f64); 4] {
         let last = self.series.len() as i64 - 1;
         let at = (t / self.spacing_s).clamp(0.0, last as f64);
         let k = (at as i64).min((last - 1).max(0));
         let u = at - k as f64;
         let inner = |u: f64| (u * u * (3.0 * u - 6.0) + 4.0) / 6.0;
         let weights = [(1.0 - u).powi(3) / 6.0, inner(u), inner(1.0 - u), u.powi(3) / 6.0];
-        let number = |i: i64| {
-            if i < 0 {
-                -i
-            } else if i > last {
-                2 * last - i
-            } else {
-                i
-            }
-            .clamp(0, last) as usize
-        };
+        // Reflected at both ends.
+        let number = |i: i64| if i > last { 2 * last - i } else { i.abs() }.clamp(0, last) as usize;
         std::array::from_fn(|i| (number(k - 1 + i as i64), weights[i]))
     }
 }
@@ -283,6 +276,7 @@ impl Series {
     fn of(node: &Node, t_s: f64) -> Result<Self, InversionError> {
         let arm = node.prescribed();
         // x = X_0 u + X_1 u̇ + X_2 ü + ..., then TCP motion and torques from it.
+        // K X_k = -(K_a, D_a, M_a)_k - D X_(k-1) - M X_(k-2), power by power of s.
         let lu = arm.own[0].clone().lu();
         let solve = |F: DMatrix<f64>| lu.solve(&F).map(|x| -x).ok_or(InversionError::Slack { t_s });
         let by = |parts: &[DMatrix<f64>; 3], direct: &[DMatrix<f64>; 3], X: &[DMatrix<f64>], order: usize| {
@@ -368,8 +362,8 @@ fn complex(A: &DMatrix<f64>) -> DMatrix<Complex<f64>> {
 /// for a matrix without any.
 ///
 /// Near a singular pose the joints would have to move far for a small correction. Singular values
-/// below [`WEAK`] of the largest are damped, more strongly the smaller they are (Nakamura and
-/// Hanafusa 1986); the remaining error is left to further iterations, or not corrected.
+/// below [`WEAK`] of the largest are damped, more strongly the smaller they are [Nakamura &
+/// Hanafusa 1986]; the remaining error is left to further iterations, or not corrected.
 fn damped_inverse(H: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
     if !H.norm_squared().is_finite() {
         return None;

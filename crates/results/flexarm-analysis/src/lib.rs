@@ -68,9 +68,10 @@ mod servo;
 mod shaping;
 pub mod signal;
 mod spectrum;
+mod totals;
 mod vibration;
 
-pub use contributions::{ContributionPeak, ContributionPeaks, engineering_strain, tcp_displacement};
+pub use contributions::{ContributionPeak, engineering_strain};
 pub use damped_modes::{DampedMode, damped_modes};
 pub use error_parts::{ErrorParts, error_parts};
 pub use fatigue::{FatigueCycle, SnCurve, rainflow, rainflow_repeating};
@@ -81,13 +82,13 @@ pub use linear_system::{
     LinearError, LinearSystem, Quantity, ResponsePeak, Spacing, frequency_grid, resolved_response, response_peaks,
     with_resonances,
 };
-pub use long_record::{ErrorSample, LongRecord};
+pub use long_record::LongRecord;
 pub use metrics::{MetricSettings, TcpMetrics, tcp_metrics, tcp_metrics_on_path};
 pub use optimal_shaper::{OptimalShaper, ShapedMode, ShaperError};
 pub use participation::{compliance_parts, effective_mass, mode_outputs, strain_energy_shares};
 pub use path_frame::{PathFrame, path_frames};
 pub use pose_error::tcp_error;
-pub use record::{ErrorRecord, RecordError};
+pub use record::{ErrorRecord, ErrorSample, RecordError};
 pub use repeated_pose::RepeatedPose;
 pub use servo::NodeServo;
 pub use shaping::{Shaper, ShaperKind};

@@ -6,7 +6,8 @@
 //! ```
 //! A force has only `B_0`. A prescribed motion has `B_2` (inertia), with gravity also `B_0`, and
 //! the rigid part `F`. Start at [`LinearSystem::response`]; [`response_peaks`] finds resonances,
-//! [`frequency_grid`] places frequencies.
+//! [`frequency_grid`] places frequencies. Not here: the matrices of an arm (`flexarm-stepping`),
+//! modes (`damped_modes`).
 
 use nalgebra::{Complex, DMatrix};
 
@@ -136,17 +137,9 @@ pub fn frequency_grid(from: f64, to: f64, points: usize, spacing: Spacing) -> Ve
         }
     };
     // The ends are exactly as given.
-    (0..=last)
-        .map(|k| {
-            if k == 0 {
-                from
-            } else if k == last {
-                to
-            } else {
-                at(k)
-            }
-        })
-        .collect()
+    let mut grid: Vec<f64> = (0..=last).map(at).collect();
+    (grid[0], grid[last]) = (from, to);
+    grid
 }
 
 /// Adds frequencies around each resonance to a grid, so that no peak falls between two points.
@@ -168,7 +161,7 @@ pub fn with_resonances(grid: &[f64], modes: &[(f64, f64)]) -> Vec<f64> {
 }
 
 /// Maximum number of halvings of an interval of the grid.
-const DEEPEST: u32 = 10;
+const MAX_HALVINGS: u32 = 10;
 /// Entries below this fraction of the largest are rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -190,10 +183,10 @@ pub fn resolved_response(
 ) -> (Vec<f64>, Vec<DMatrix<Complex<f64>>>) {
     let mut found: Vec<(f64, DMatrix<Complex<f64>>)> = Vec::new();
     for (frequency, response) in grid.iter().filter_map(|f| Some((*f, answer(*f)?))) {
-        // Intervals to the next points, the nearest last.
+        // Open intervals to the next points, the nearest last; each begins at the last point found.
         let mut open = vec![(frequency, response, 0)];
         while let Some((b, H_b, depth)) = open.pop() {
-            let middle = found.last().filter(|_| depth < DEEPEST).and_then(|(a, H_a)| {
+            let middle = found.last().filter(|_| depth < MAX_HALVINGS).and_then(|(a, H_a)| {
                 let m = if *a > 0.0 { (a * b).sqrt() } else { 0.5 * (a + b) };
                 let H_m = answer(m).filter(|H_m| *a < m && m < b && strays(H_a, H_m, &H_b, tolerance))?;
                 Some((m, H_m))
@@ -236,8 +229,12 @@ pub struct ResponsePeak {
 /// neighbours by golden-section search; the highest first. The ends of the grid are not peaks.
 ///
 /// * `grid`: ascending, fine enough that each peak has its own point ([`with_resonances`]).
-///   `values`: magnitudes there.
+/// * `values`: magnitudes there, one per frequency. `magnitude`: the same function, anywhere.
+///
+/// # Panics
+/// If `grid` and `values` differ in length.
 pub fn response_peaks(grid: &[f64], values: &[f64], magnitude: impl Fn(f64) -> f64) -> Vec<ResponsePeak> {
+    assert_eq!(grid.len(), values.len(), "one magnitude for each frequency");
     let mut peaks: Vec<ResponsePeak> = (1..grid.len().saturating_sub(1))
         .filter(|&k| values[k] >= values[k - 1] && values[k] > values[k + 1])
         .map(|k| {

@@ -1,14 +1,16 @@
 //! The figures of a whole record.
 //!
-//! Start at [`tcp_metrics`]. Figures after each move are in `hold`, the spectrum in `spectrum`.
+//! Start at [`tcp_metrics`]. World axes; path axes are tangential, normal, binormal. Not here: figures
+//! after each move (`hold`), sums over the samples (`totals`), the spectrum (`spectrum`).
 
 use nalgebra::Vector3;
 
-use crate::hold::{Hold, HoldMetrics, is_seen};
+use crate::hold::{Hold, HoldMetrics, is_significant};
 use crate::path_frame::{path_frames, tangential_at};
-use crate::record::{ErrorRecord, RecordError};
-use crate::repeated_pose::{RepeatedPose, repeated_poses};
+use crate::record::{ErrorRecord, ErrorSample, RecordError};
+use crate::repeated_pose::RepeatedPose;
 use crate::spectrum::{Taper, strongest_line_from};
+use crate::totals::Totals;
 
 /// Settings of the figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,13 +112,7 @@ pub fn tcp_metrics_on_path(
         }
     }
 
-    let translation = |e: &[f64; 6]| Vector3::new(e[0], e[1], e[2]).norm();
-    let rotation = |e: &[f64; 6]| Vector3::new(e[3], e[4], e[5]).norm();
-    let distances: Vec<f64> = record.errors.iter().map(translation).collect();
-    let angles: Vec<f64> = record.errors.iter().map(rotation).collect();
-    let (t_peak_s, peak_m) = peak(record.times, &distances);
-    let (_, peak_rad) = peak(record.times, &angles);
-
+    // Components along the path, from the positions unless they are given.
     let from_positions = || -> Vec<[f64; 3]> {
         let frames = path_frames(record.times, record.rigid_positions);
         let pairs = record.errors.iter().zip(&frames);
@@ -124,72 +120,20 @@ pub fn tcp_metrics_on_path(
     };
     let computed = if path_errors.is_none() { from_positions() } else { Vec::new() };
     let path_errors = path_errors.unwrap_or(&computed);
-    let [tangential_peak_m, normal_peak_m, binormal_peak_m, lateral_peak_m] = path_peaks(path_errors);
-    let [path_accuracy_m, path_rms_m] = path_accuracy(record, path_errors);
-    let holds = holds(record, band);
-    // The worst stop counts; one stop that does not settle is enough.
-    let settling = holds.iter().map(|hold| hold.settling_s).reduce(|a, b| Some(a?.max(b?)));
-    Ok(TcpMetrics {
-        peak_m,
-        t_peak_s,
-        rms_m: rms(record.times, &distances),
-        end_m: distances[distances.len() - 1],
-        static_sag_m: distances[0],
-        peak_rad,
-        rms_rad: rms(record.times, &angles),
-        settling_s: settling.flatten(),
-        overshoot_m: holds.iter().map(|hold| hold.overshoot_m).fold(0.0, f64::max),
-        dominant_hz: dominant_hz(record, &holds, settings),
-        tangential_peak_m,
-        normal_peak_m,
-        binormal_peak_m,
-        lateral_peak_m,
-        path_accuracy_m,
-        path_rms_m,
-        repeated: repeated_poses(&holds),
-        holds,
-    })
-}
 
-/// Time and value of the maximum, the first one if there are several.
-fn peak(times: &[f64], values: &[f64]) -> (f64, f64) {
-    let first = (times[0], values[0]);
-    times.iter().copied().zip(values.iter().copied()).fold(first, |best, e| if e.1 > best.1 { e } else { best })
-}
-
-/// Root mean square over time.
-fn rms(times: &[f64], values: &[f64]) -> f64 {
-    let last = times.len() - 1;
-    if last == 0 {
-        return values[0];
+    let mut totals = Totals::default();
+    for (i, &time_s) in record.times.iter().enumerate() {
+        let (error, path_error, rigid_position) = (record.errors[i], path_errors[i], record.rigid_positions[i]);
+        let sample = ErrorSample { time_s, error, path_error, rigid_position, static_m: [0.0; 3] };
+        totals.add(&sample, is_in_move(record.moves, time_s));
     }
-    let area = |i: usize| 0.5 * (values[i].powi(2) + values[i + 1].powi(2)) * (times[i + 1] - times[i]);
-    ((0..last).map(area).sum::<f64>() / (times[last] - times[0])).sqrt()
+    Ok(totals.metrics(holds(record, band), || record_hz(record, settings)))
 }
 
-/// Peaks along the tangential, normal and binormal axis, and of the distance from the path.
-fn path_peaks(path_errors: &[[f64; 3]]) -> [f64; 4] {
-    let mut peaks: [f64; 4] = [0.0; 4];
-    for &[t, n, b] in path_errors {
-        for (peak, value) in peaks.iter_mut().zip([t, n, b, n.hypot(b)]) {
-            *peak = peak.max(value.abs());
-        }
-    }
-    peaks
-}
-
-/// Maximum and root mean square distance from the path in the samples of the moves.
-fn path_accuracy(record: &ErrorRecord<'_>, path_errors: &[[f64; 3]]) -> [f64; 2] {
-    let (mut largest, mut squares, mut count) = (0.0_f64, 0.0, 0_usize);
-    for (t, [_, n, b]) in record.times.iter().zip(path_errors) {
-        if !record.moves.iter().any(|(start, end)| (*start..=*end).contains(t)) {
-            continue;
-        }
-        largest = largest.max(n.hypot(*b));
-        squares += n * n + b * b;
-        count += 1;
-    }
-    [largest, (squares / count.max(1) as f64).sqrt()]
+/// Returns whether a time is within one of the moves, which ascend.
+pub(crate) fn is_in_move(moves: &[(f64, f64)], time_s: f64) -> bool {
+    let begun = moves.partition_point(|(start, _)| *start <= time_s);
+    begun > 0 && time_s <= moves[begun - 1].1
 }
 
 /// Returns the hold after each move that has one.
@@ -222,15 +166,12 @@ fn holds(record: &ErrorRecord<'_>, band: f64) -> Vec<HoldMetrics> {
     holds
 }
 
-fn dominant_hz(record: &ErrorRecord<'_>, holds: &[HoldMetrics], settings: &MetricSettings) -> Option<f64> {
-    let lines = holds.iter().filter_map(|hold| hold.line);
-    if let Some(line) = lines.max_by(|a, b| a.amplitude.total_cmp(&b.amplitude)) {
-        return Some(line.hz);
-    }
+/// Returns the frequency of the strongest line of the whole record without its trend (Hz).
+fn record_hz(record: &ErrorRecord<'_>, settings: &MetricSettings) -> Option<f64> {
     let trend = |i: usize, c: usize| record.quasi_static.map_or(0.0, |values| values[i][c]);
     let rest = record.errors.iter().enumerate();
     let rest: Vec<[f64; 3]> = rest.map(|(i, e)| std::array::from_fn(|c| e[c] - trend(i, c))).collect();
     let line = strongest_line_from(record.times, &rest, Taper::Both, settings.lowest_hz);
     // An arm at rest oscillates by rounding.
-    line.filter(|line| is_seen(line, settings.settling_band_m)).map(|line| line.hz)
+    line.filter(|line| is_significant(line, settings.settling_band_m)).map(|line| line.hz)
 }

@@ -8,7 +8,8 @@
 //! second-order cone program, with one cone for each mode and frequency [Boyd & Vandenberghe 2004,
 //! section 4.4.2]; Clarabel solves it. The grid is then refined around the copies found. Since the
 //! weights are not negative, the shaped motion stays within the ranges and below the speeds of the
-//! original motion.
+//! original motion. Start at [`Shaper::optimal`]. Not here: ZV and ZVD shapers (`shaping`), the
+//! vibration of a motion (`vibration`).
 
 use std::f64::consts::TAU;
 
@@ -78,33 +79,35 @@ const PER_PERIOD: f64 = 24.0;
 /// Maximum delay in periods of the fastest mode.
 const MAX_PERIODS: f64 = 25.0;
 /// Number of frequencies at which the band of a mode is evaluated.
-const IN_BAND: usize = 21;
-/// Maximum width of the band.
-const WIDEST: f64 = 0.5;
+const BAND_POINTS: usize = 21;
+/// Maximum relative width of the band to either side.
+const MAX_BAND: f64 = 0.5;
 /// Weights below this are not copies.
-const NO_COPY: f64 = 1e-6;
-/// Grid refinement: number of passes, and refinement factor, which is also the number of new steps
-/// to either side.
-const CLOSER: (usize, i32) = (3, 8);
+const MIN_WEIGHT: f64 = 1e-6;
+/// Number of refinements of the grid.
+const REFINEMENTS: usize = 3;
+/// Factor of a refinement, and number of new steps to either side of a copy.
+const REFINEMENT: i32 = 8;
 /// Residual vibration that counts as zero, relative to the vibration without a shaper.
-const NOTHING: f64 = 1e-7;
+const NO_VIBRATION: f64 = 1e-7;
 /// Tolerance of the solver on the minimum, relative to the vibration without a shaper.
 const GAP: f64 = 1e-10;
 
 impl Shaper {
-    /// Computes the shaper with the smallest residual vibration of several modes, at a delay after
-    /// the end of the motion.
+    /// Computes the shaper with the smallest residual vibration of several modes.
     ///
-    /// * `delay_s`: maximum delay of the last copy; `band`: relative uncertainty of each frequency
-    ///   to either side, such as 0.1.
+    /// * `delay_s`: maximum delay of the last copy, at most 25 periods of the fastest mode.
+    /// * `band`: relative uncertainty of each frequency to either side, from 0 to 0.5, such as 0.1.
+    ///
+    /// The vibrations are evaluated at `delay_s` after the end of the original motion.
     ///
     /// # Errors
     /// [`ShaperError`].
     pub fn optimal(modes: &[ShapedMode], delay_s: f64, band: f64) -> Result<OptimalShaper, ShaperError> {
         check(modes, delay_s, band)?;
-        let quickest = modes.iter().map(|mode| mode.hz).fold(0.0, f64::max);
+        let fastest_hz = modes.iter().map(|mode| mode.hz).fold(0.0, f64::max);
         // Even number of steps, so that half the delay is on the grid.
-        let half = (0.5 * PER_PERIOD * delay_s * quickest).ceil().max(4.0) as usize;
+        let half = (0.5 * PER_PERIOD * delay_s * fastest_hz).ceil().max(4.0) as usize;
         let mut step = 0.5 * delay_s / half as f64;
         let mut times: Vec<f64> = (0..=2 * half).map(|k| step * k as f64).collect();
         let size = modes.iter().map(|mode| mode.vibration).fold(0.0, f64::max);
@@ -113,12 +116,12 @@ impl Shaper {
             modes.iter().flat_map(|mode| within(band).into_iter().map(move |f| of(mode, f))).fold(0.0, f64::max)
         };
         let mut best: Option<OptimalShaper> = None;
-        for _ in 0..=CLOSER.0 {
-            let Some(copies) = least(modes, band, delay_s, size, &times) else { break };
+        for _ in 0..=REFINEMENTS {
+            let Some(copies) = minimised(modes, band, delay_s, size, &times) else { break };
             let whole = Shaper { copies };
             // If many shapers leave zero vibration, keep the central one unchanged.
-            let many = left(&whole) < NOTHING * size;
-            let shaper = if many { whole } else { gathered(&whole.copies, step) }.without_nothing();
+            let many = left(&whole) < NO_VIBRATION * size;
+            let shaper = if many { whole } else { merged(&whole.copies, step) }.normalised();
             let around: Vec<f64> = shaper.copies.iter().map(|(t, _)| *t).collect();
             let found = OptimalShaper { left: left(&shaper), shaper };
             if best.as_ref().is_none_or(|best| found.left < best.left) {
@@ -127,8 +130,10 @@ impl Shaper {
             if many {
                 break;
             }
-            step /= f64::from(CLOSER.1);
-            times = around.iter().flat_map(|t| (-CLOSER.1..=CLOSER.1).map(move |k| t + step * f64::from(k))).collect();
+            // New times around each copy, and both ends.
+            step /= f64::from(REFINEMENT);
+            times =
+                around.iter().flat_map(|t| (-REFINEMENT..=REFINEMENT).map(move |k| t + step * f64::from(k))).collect();
             times.retain(|t| *t >= 0.0 && *t <= delay_s);
             times.extend([0.0, delay_s]);
             times.sort_by(f64::total_cmp);
@@ -146,7 +151,7 @@ fn check(modes: &[ShapedMode], delay_s: f64, band: f64) -> Result<(), ShaperErro
     if !(delay_s > 0.0 && delay_s.is_finite()) {
         return wrong("the delay of the shaper", delay_s, "a positive time (s)");
     }
-    if !(0.0..=WIDEST).contains(&band) {
+    if !(0.0..=MAX_BAND).contains(&band) {
         return wrong("the band of the shaper", band, "a part of the frequency from 0 to 0.5");
     }
     for mode in modes {
@@ -172,12 +177,12 @@ pub(crate) fn within(band: f64) -> Vec<f64> {
     if band == 0.0 {
         return vec![1.0];
     }
-    (0..IN_BAND).map(|k| 1.0 + band * (2.0 * k as f64 / (IN_BAND - 1) as f64 - 1.0)).collect()
+    (0..BAND_POINTS).map(|k| 1.0 + band * (2.0 * k as f64 / (BAND_POINTS - 1) as f64 - 1.0)).collect()
 }
 
 /// Merges the weights into one copy for each local maximum: neighbours on the grid represent one
 /// copy between them.
-fn gathered(grid: &[(f64, f64)], step: f64) -> Shaper {
+fn merged(grid: &[(f64, f64)], step: f64) -> Shaper {
     let mut copies: Vec<(f64, f64)> = Vec::new();
     let mut falls = false;
     for (k, &(time, part)) in grid.iter().enumerate() {
@@ -200,8 +205,8 @@ fn gathered(grid: &[(f64, f64)], step: f64) -> Shaper {
 
 impl Shaper {
     /// Removes negligible copies; their weight is distributed to the others in proportion.
-    fn without_nothing(self) -> Self {
-        let kept: Vec<(f64, f64)> = self.copies.into_iter().filter(|(_, part)| *part > NO_COPY).collect();
+    fn normalised(self) -> Self {
+        let kept: Vec<(f64, f64)> = self.copies.into_iter().filter(|(_, part)| *part > MIN_WEIGHT).collect();
         let sum: f64 = kept.iter().map(|(_, part)| part).sum();
         Self { copies: kept.into_iter().map(|(t, part)| (t, part / sum)).collect() }
     }
@@ -212,12 +217,13 @@ impl Shaper {
 /// ```text
 /// min t    Σ a_i = 1,   a_i >= 0,   t >= w_k |r_k| / size
 /// ```
-fn least(modes: &[ShapedMode], band: f64, delay_s: f64, size: f64, times: &[f64]) -> Option<Vec<(f64, f64)>> {
+fn minimised(modes: &[ShapedMode], band: f64, delay_s: f64, size: f64, times: &[f64]) -> Option<Vec<(f64, f64)>> {
     // Clarabel's form: b - A x is in the cones, with x = (weights, t).
     let n = times.len();
     let mut cones = vec![SupportedConeT::ZeroConeT(1), SupportedConeT::NonnegativeConeT(n)];
     let mut A: Vec<(usize, usize, f64)> = (0..n).flat_map(|i| [(0, i, 1.0), (1 + i, i, -1.0)]).collect();
     let mut rows = 1 + n;
+    // |r_k| w_k / size <= t: rows t, Re, Im.
     for (mode, f) in modes.iter().flat_map(|mode| within(band).into_iter().map(move |f| (mode, f))) {
         let omega = TAU * f * mode.hz;
         let lambda = Complex::new(-mode.ratio * omega, omega * (1.0 - mode.ratio * mode.ratio).sqrt());

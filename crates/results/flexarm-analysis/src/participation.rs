@@ -1,4 +1,6 @@
 //! Participation of a mode: at the TCP, and in the strain energy of the elements.
+//!
+//! Shapes have unit modal mass, `φᴴ M φ = 1`. Not here: the modes (`damped_modes`).
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -7,6 +9,11 @@ use crate::damped_modes::DampedMode;
 /// Computes the motion of the outputs in a mode, `C φ`, for a shape of unit modal mass.
 ///
 /// * `C`: p×n, output per coordinate (for the TCP its Jacobian, rows linear first).
+///
+/// Returns p complex numbers: amplitude and phase of each output.
+///
+/// # Panics
+/// If `C` has not one column for each coordinate of the shape.
 pub fn mode_outputs(mode: &DampedMode, C: &DMatrix<f64>) -> DVector<Complex<f64>> {
     C.map(|x| Complex::new(x, 0.0)) * &mode.shape
 }
@@ -26,7 +33,9 @@ pub fn effective_mass(output: Complex<f64>) -> f64 {
 /// ```
 /// Without damping this is `(c φ)² / ω²`. `None` for a rigid motion, which has no compliance.
 ///
-/// * `C`: p×n, output per coordinate. Returns p numbers (m/N, rad/(N m)).
+/// * `M`, `D`: n×n, as in [`crate::damped_modes`]. `C`: p×n, output per coordinate.
+///
+/// Returns p numbers (m/N, rad/(N m)).
 pub fn compliance_parts(
     mode: &DampedMode,
     M: &DMatrix<f64>,
@@ -46,7 +55,9 @@ pub fn compliance_parts(
 /// Computes the share of each element in the strain energy of a shape, `φᴴ K_k φ` over the sum;
 /// zeros if there is no strain energy.
 ///
-/// * `blocks`: first coordinate and stiffness of each element.
+/// * `blocks`: first coordinate of each element, and its stiffness, symmetric.
+///
+/// Returns one number per element; they add up to 1.
 pub fn strain_energy_shares(shape: &DVector<Complex<f64>>, blocks: &[(usize, DMatrix<f64>)]) -> Vec<f64> {
     let energies: Vec<f64> = blocks
         .iter()

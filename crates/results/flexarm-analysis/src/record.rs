@@ -1,4 +1,6 @@
-//! Input of the metrics, and its consistency check.
+//! Input of the metrics, as a whole or sample by sample, and its consistency check.
+//!
+//! World axes, SI units. Not here: what is computed from it (`metrics`, `long_record`).
 
 /// A record of the TCP error: one entry per sample, with uniform or varying steps.
 #[derive(Debug, Clone, Copy)]
@@ -15,6 +17,21 @@ pub struct ErrorRecord<'a> {
     pub quasi_static: Option<&'a [[f64; 3]]>,
     /// Start and end of each move, s, ascending; between them the joints hold.
     pub moves: &'a [(f64, f64)],
+}
+
+/// One sample: see the fields of [`ErrorRecord`].
+#[derive(Debug, Clone, Copy)]
+pub struct ErrorSample {
+    /// Time, s.
+    pub time_s: f64,
+    /// Translation (m) and rotation vector (rad), world axes.
+    pub error: [f64; 6],
+    /// Translation along the path axes, m.
+    pub path_error: [f64; 3],
+    /// Position of the rigid TCP, m.
+    pub rigid_position: [f64; 3],
+    /// Static part of the translation, m; NaN if unknown.
+    pub static_m: [f64; 3],
 }
 
 /// Reason why a record has no metrics.

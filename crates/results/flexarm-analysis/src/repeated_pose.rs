@@ -1,5 +1,5 @@
 //! Poses at which the TCP comes to rest more than once: pose accuracy and repeatability in the
-//! sense of ISO 9283.
+//! sense of ISO 9283. Not here: the rests themselves (`hold`).
 
 use nalgebra::Vector3;
 

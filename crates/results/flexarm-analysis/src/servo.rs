@@ -7,7 +7,8 @@
 //! with the commands u, the motors q, the torques τ that their motion needs and the feed-forward F.
 //! The lead `u - q` obeys the equation of the servo on a rigid arm: it is stable if the servo is,
 //! and needs no look-ahead. It is integrated by backward differences of second order, which also
-//! work without feed-forward.
+//! work without feed-forward. Start at `NodeServo::leads`. Not here: the torques that the motion needs
+//! (`inversion`).
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -40,7 +41,7 @@ impl NodeServo {
     /// Adds the controllers to the dynamic stiffness of the free coordinates, the first of which
     /// are the motors, and to the forces per command.
     pub(crate) fn close(&self, s: Complex<f64>, Z: &mut DMatrix<Complex<f64>>, N: &mut DMatrix<Complex<f64>>) {
-        let F = self.fed(s);
+        let F = self.feed_forward(s);
         for (i, axis) in self.axes.iter().enumerate() {
             let C = s * self.damping[i] + self.stiffness[i] + self.integral[i] / s;
             Z[(i, i)] += C;
@@ -53,14 +54,15 @@ impl NodeServo {
     /// Returns `C + F`, d×d.
     #[doc(hidden)]
     pub fn references(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
-        let mut all = self.fed(s).select_columns(&self.axes);
+        let mut all = self.feed_forward(s).select_columns(&self.axes);
         for i in 0..self.axes.len() {
             all[(i, i)] += s * self.damping[i] + self.stiffness[i] + self.integral[i] / s;
         }
         all
     }
 
-    fn fed(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
+    /// Returns the feed-forward `F(s)`, d×m.
+    fn feed_forward(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
         let part = |k: usize, power: Complex<f64>| self.ahead[k].map(|x| power * x);
         part(0, Complex::new(1.0, 0.0)) + part(1, s) + part(2, s * s)
     }
@@ -78,6 +80,7 @@ impl NodeServo {
         if N == 0 {
             return leads;
         }
+        // Before the first column the arm rests under the first torques.
         let (sum, lead) = at(0).at_rest(&torques.column(0).into_owned());
         // Integral, lead and its rate at the last two instants.
         let mut before = [[sum.clone(), lead.clone(), DVector::zeros(d)], [sum, lead, DVector::zeros(d)]];
@@ -93,6 +96,7 @@ impl NodeServo {
             let known = &M * (&rate_0 * b + &acceleration_0) + &D * &rate_0 - &integral * &lead_0 / b;
             let right = torques.column(column) - known;
             let lead = left.lu().solve(&right).unwrap_or_else(|| DVector::zeros(d));
+            // Integral, lead and rate at this instant, from the same rule.
             let now = [(&lead - &lead_0) / b, lead.clone(), &lead * b + &rate_0];
             let [last, _] = before;
             before = [now, last];

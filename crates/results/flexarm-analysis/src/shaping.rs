@@ -5,8 +5,8 @@
 //! q_s(t) = Σ a_i q(t - t_i),   Σ a_i = 1
 //! ```
 //! Zero vibration (ZV, two copies half a damped period apart), and zero vibration and derivative
-//! (ZVD, three copies), which is robust against frequency errors (Singer and Seering 1990). Shapers
-//! of several modes are convolved; the best one within a given delay is in `optimal_shaper`.
+//! (ZVD, three copies), which is robust against frequency errors [Singer & Seering 1990]. Shapers
+//! of several modes are convolved. Not here: the best shaper within a given delay (`optimal_shaper`).
 
 use std::f64::consts::{PI, TAU};
 
@@ -30,7 +30,14 @@ pub struct Shaper {
 impl Shaper {
     /// Creates a shaper for one mode.
     ///
-    /// * `hz`: undamped natural frequency; `ratio`: its damping ratio, below 1.
+    /// ```text
+    /// K = exp(-ζ π / sqrt(1 - ζ²)),   ZV: weights 1, K,   ZVD: 1, 2K, K²,   each over their sum
+    /// ```
+    ///
+    /// * `hz`: undamped natural frequency (Hz), positive. `ratio`: its damping ratio ζ, below 1.
+    ///
+    /// # Source
+    /// [Singer & Seering 1990].
     pub fn new(kind: ShaperKind, hz: f64, ratio: f64) -> Self {
         let damped = hz * (1.0 - ratio * ratio).sqrt();
         let half = 0.5 / damped;
@@ -43,7 +50,7 @@ impl Shaper {
         Self { copies: parts.iter().enumerate().map(|(k, part)| (half * k as f64, part / sum)).collect() }
     }
 
-    /// Returns the shaper for the modes of both.
+    /// Returns the convolution of two shapers, which suppresses the modes of both.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         let both = self.copies.iter().flat_map(|(t, a)| other.copies.iter().map(move |(s, b)| (t + s, a * b)));
@@ -55,22 +62,26 @@ impl Shaper {
         self.copies.iter().map(|(t, _)| *t).fold(0.0, f64::max)
     }
 
-    /// Returns the shaped value of a curve at time t.
+    /// Returns the shaped value `Σ a_i q(t - t_i)` of a curve `q` at time `t` (s).
     pub fn apply(&self, t: f64, mut curve: impl FnMut(f64) -> f64) -> f64 {
         self.copies.iter().map(|(delay, part)| part * curve(t - delay)).sum()
     }
 
-    /// Returns the vibration of a mode after a step, relative to that without the shaper.
+    /// Returns the vibration of a mode after a step, relative to that without the shaper, at the
+    /// time of the last copy; arguments as in [`Shaper::new`].
     pub fn residual(&self, hz: f64, ratio: f64) -> f64 {
         self.residual_at(hz, ratio, self.delay_s())
     }
 
-    /// The same at a time after the step (s) that is not before the last copy.
+    /// As [`Shaper::residual`], at `end_s` after the step (s), not before the last copy.
+    ///
+    /// ```text
+    /// |Σ a_i exp(λ (end - t_i))|,   λ = -ζ ω + i ω sqrt(1 - ζ²)
+    /// ```
     pub fn residual_at(&self, hz: f64, ratio: f64, end_s: f64) -> f64 {
         let (w, wd) = (TAU * hz, TAU * hz * (1.0 - ratio * ratio).sqrt());
-        let end = end_s;
         let sum = |f: fn(f64) -> f64| -> f64 {
-            self.copies.iter().map(|(t, a)| a * (ratio * w * (t - end)).exp() * f(wd * t)).sum()
+            self.copies.iter().map(|(t, a)| a * (ratio * w * (t - end_s)).exp() * f(wd * t)).sum()
         };
         sum(f64::cos).hypot(sum(f64::sin))
     }

@@ -1,4 +1,7 @@
 //! Signals with uniform samples: zero-phase low-pass, derivatives, delays, linear least squares.
+//!
+//! A signal is a slice of values in any unit, a fixed time apart. Not here: spectra
+//! ([`crate::amplitude_spectrum`]), signals with uneven steps.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -22,8 +25,14 @@ pub struct LowPass {
 impl LowPass {
     /// Creates the filter for a sampling rate.
     ///
-    /// * `cut_hz`: frequency of 3 dB attenuation in one pass. * `rate_hz`: samples per second.
+    /// ```text
+    /// H(s) = Π 1/(s² + s/Q_i + 1),   1/Q_i = 2 cos(π/8), 2 cos(3π/8),   s = (1/k) (z - 1)/(z + 1)
+    /// ```
+    ///
+    /// * `cut_hz`: frequency of 3 dB attenuation in one pass, above 0 and below half of `rate_hz`.
+    /// * `rate_hz`: samples per second.
     pub fn new(cut_hz: f64, rate_hz: f64) -> Self {
+        // Bilinear transformation, exact at the cut-off frequency.
         let k = (std::f64::consts::PI * cut_hz / rate_hz).tan();
         let section = |angle: f64| {
             let inverse_q = 2.0 * angle.cos();
@@ -35,12 +44,13 @@ impl LowPass {
         Self { sections, reach: (3.0 * rate_hz / cut_hz) as usize }
     }
 
-    /// Filters a signal.
+    /// Filters a signal; returns as many values, without delay.
     pub fn of(&self, x: &[f64]) -> Vec<f64> {
         let (n, reach) = (x.len(), self.reach.min(x.len().saturating_sub(1)));
         if n == 0 {
             return Vec::new();
         }
+        // Point reflection at both ends keeps value and slope there.
         let before = (1..=reach).rev().map(|k| 2.0 * x[0] - x[k]);
         let after = (1..=reach).map(|k| 2.0 * x[n - 1] - x[n - 1 - k]);
         let mut y: Vec<f64> = before.chain(x.iter().copied()).chain(after).collect();
@@ -67,7 +77,9 @@ impl Section {
     }
 }
 
-/// Derivative by central differences, one-sided at the ends.
+/// Computes the derivative by central differences, one-sided at the ends; NaN for a single value.
+///
+/// Returns as many values, per second.
 pub fn derivative(x: &[f64], step_s: f64) -> Vec<f64> {
     let n = x.len();
     let at = |i: usize| {
@@ -87,7 +99,7 @@ pub fn delayed(x: &[f64], by_s: f64, step_s: f64) -> Vec<f64> {
     (0..x.len()).map(at).collect()
 }
 
-/// Root mean square; NaN if there are no values.
+/// Computes the root mean square; NaN if there are no values.
 pub fn rms(x: impl Iterator<Item = f64>) -> f64 {
     let (mut sum, mut n) = (0.0, 0usize);
     for x in x {
@@ -97,9 +109,16 @@ pub fn rms(x: impl Iterator<Item = f64>) -> f64 {
     (sum / n as f64).sqrt()
 }
 
-/// Factors of the columns whose sum best approximates `y` in the least-squares sense; columns are
-/// normalised first.
+/// Computes the factors of columns whose sum best approximates `y` in the least-squares sense.
+///
+/// Columns are normalised first; directions below 1e-10 of the largest singular value get no part.
+///
+/// Returns one factor per column; `None` if a column has a value that is not finite.
+///
+/// # Panics
+/// If the columns and `y` differ in length.
 pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
+    assert!(columns.iter().all(|column| column.len() == y.len()), "columns and y have the same length");
     let size = |column: &Vec<f64>| column.iter().map(|x| x * x).sum::<f64>().sqrt().max(f64::MIN_POSITIVE);
     let sizes: Vec<f64> = columns.iter().map(size).collect();
     let X = DMatrix::from_fn(y.len(), columns.len(), |i, j| columns[j][i] / sizes[j]);
@@ -110,7 +129,7 @@ pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
     Some(solved.iter().zip(&sizes).map(|(x, size)| x / size).collect())
 }
 
-/// Residual: `y` minus the sum of the columns with their factors.
+/// Computes the residual of [`least_squares`]: `y` minus the sum of the columns times their factors.
 pub fn rest(columns: &[Vec<f64>], factors: &[f64], y: &[f64]) -> Vec<f64> {
     let sum = |i: usize| columns.iter().zip(factors).map(|(column, factor)| factor * column[i]).sum::<f64>();
     y.iter().enumerate().map(|(i, y)| y - sum(i)).collect()

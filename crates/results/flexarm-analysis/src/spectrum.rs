@@ -2,6 +2,7 @@
 //!
 //! The signal is tapered and transformed by a radix-2 FFT of twice its length; the highest peak is
 //! refined by golden-section search on the exact transform. 10 s at 1 kHz take a few milliseconds.
+//! Start at [`strongest_line`]. Not here: choice of the interval of a record (`metrics`, `hold`).
 
 use std::f64::consts::{PI, TAU};
 

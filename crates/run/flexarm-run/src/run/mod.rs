@@ -154,9 +154,7 @@ pub(crate) fn simulate(
     }
     let shares_scale = expected.is_some();
     let expected = expected.unwrap_or_else(|| detail.expected(&plant, &arm.tcp, scenario));
-    let stress = StressMonitor::new(arm, &plant)?;
-    let mut run = RunLoop::new(robot, &scenario.motion, options, arm, plant, stepper, detail);
-    run.monitors = run.monitors.with_stress(stress);
+    let mut run = RunLoop::new(&scenario.motion, options, arm, plant, stepper, detail)?;
     let mut files = open_recordings(outputs, more, &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
     let head = run.header(scenario, &expected);
     files.begin(&head)?;
@@ -330,26 +328,27 @@ struct RunLoop<'a> {
 
 impl<'a> RunLoop<'a> {
     fn new(
-        robot: &'a Robot,
         motion: &'a Motion,
         options: &'a RunOptions,
         arm: &'a Arm,
         plant: Arc<Plant>,
         stepper: Box<dyn Stepper>,
         detail: Detail,
-    ) -> Self {
-        let tcp = arm.tcp.clone();
+    ) -> Result<Self, Error> {
+        let (robot, tcp) = (arm.robot(), arm.tcp.clone());
         let duration = motion.trajectory.duration();
         let last = (duration / options.step_s - 1e-9).ceil().max(0.0) as u64;
         let every = steps_per_sample(options);
         let mut twin = RigidTwin::new(&plant);
         let tool = tool_monitor(&plant, &tcp, &mut twin, motion, options, every as f64 * options.step_s);
+        let (n_drives, stress) = (robot.drives.len(), StressMonitor::new(arm, &plant)?);
+        // Recordings and observers need the frames of the links; columns and figures do not.
         let (mut bends, mut places, mut frames) = Default::default();
         if detail >= Detail::Samples {
             (bends, places) = stations(&arm.bends, &plant.model, &ordered_links(robot));
             frames = link_frames(robot, &plant.model);
         }
-        Self {
+        Ok(Self {
             robot,
             motion,
             options,
@@ -357,7 +356,7 @@ impl<'a> RunLoop<'a> {
             tcp,
             twin,
             seen: Observation::new(&plant),
-            monitors: Monitors::new(&plant, arm, robot.drives.len(), tool).along(motion.tool_path.clone()),
+            monitors: Monitors::new(&plant, arm, n_drives, tool, stress, motion.tool_path.clone()),
             sampler: Sampler::new(robot, arm, frames, places),
             sample: Sample::default(),
             trace: Trace::default(),
@@ -370,7 +369,7 @@ impl<'a> RunLoop<'a> {
             last,
             plant,
             stepper,
-        }
+        })
     }
 
     /// Returns the header of recordings and curves, as far as `detail` needs it.

@@ -2,10 +2,10 @@
 //! error of servos.
 //!
 //! ```text
-//! u_T = J_e e        first order: columns of the twin's Jacobian that belong to the deflections e
+//! u_T_W = J_WT_W[:, e] e        first order: columns of the twin's Jacobian of the deflections e
 //! ```
 
-use flexarm_analysis::{ContributionPeak, ContributionPeaks};
+use flexarm_analysis::ContributionPeak;
 use flexarm_stepping::{ElasticElement, Observation, Plant};
 use nalgebra::Vector6;
 
@@ -18,7 +18,7 @@ pub(crate) struct Contributions {
     places: Vec<usize>,
     /// TCP displacement by each contributor at the last sample: m and rad, world axes.
     moved: Vec<Vector6<f64>>,
-    peaks: ContributionPeaks,
+    peaks: Vec<ContributionPeak>,
 }
 
 impl Contributions {
@@ -29,7 +29,11 @@ impl Contributions {
             Owner::Drive(drive) => n_links + drive,
         });
         let count = n_links + n_drives + 1;
-        Self { places: places.collect(), moved: vec![Vector6::zeros(); count], peaks: ContributionPeaks::new(count) }
+        Self {
+            places: places.collect(),
+            moved: vec![Vector6::zeros(); count],
+            peaks: vec![ContributionPeak::default(); count],
+        }
     }
 
     pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, plant: &Plant) {
@@ -48,8 +52,8 @@ impl Contributions {
                 *following += twin.J.column(k) * (seen.q[k] - twin.state.q[k]);
             }
         }
-        for (place, displacement) in self.moved.iter().enumerate() {
-            self.peaks.add(place, seen.t, displacement);
+        for (peak, displacement) in self.peaks.iter_mut().zip(&self.moved) {
+            peak.update(seen.t, displacement);
         }
     }
 
@@ -66,6 +70,6 @@ impl Contributions {
 
     /// Returns the maximum displacement by each contributor.
     pub(crate) fn result(&self) -> &[ContributionPeak] {
-        self.peaks.peaks()
+        &self.peaks
     }
 }

@@ -46,9 +46,16 @@ pub(crate) struct Monitors {
 }
 
 impl Monitors {
-    /// Creates the monitors for an arm of a robot with `n_drives` drives; `tool` is built
-    /// separately.
-    pub(crate) fn new(plant: &Plant, arm: &Arm, n_drives: usize, tool: ToolMonitor) -> Self {
+    /// Creates the monitors of an arm of a robot with `n_drives` drives; those of TCP and stress are
+    /// built separately.
+    pub(crate) fn new(
+        plant: &Plant,
+        arm: &Arm,
+        n_drives: usize,
+        tool: ToolMonitor,
+        stress: Option<StressMonitor>,
+        tool_path: Option<Arc<ToolPath>>,
+    ) -> Self {
         Self {
             tool,
             contributions: Contributions::new(arm, n_drives),
@@ -56,21 +63,9 @@ impl Monitors {
             deflections: Deflections::new(plant, arm, n_drives),
             drive_loads: DriveLoads::new(plant),
             energy: Energy::new(&plant.model),
-            stress: None,
-            tool_path: None,
+            stress,
+            tool_path: tool_path.map(ToolPathMonitor::new),
         }
-    }
-
-    /// Adds a monitor of the TCP path.
-    #[must_use]
-    pub(crate) fn along(self, path: Option<Arc<ToolPath>>) -> Self {
-        Self { tool_path: path.map(ToolPathMonitor::new), ..self }
-    }
-
-    /// Adds a monitor of stress.
-    #[must_use]
-    pub(crate) fn with_stress(self, stress: Option<StressMonitor>) -> Self {
-        Self { stress, ..self }
     }
 
     /// Passes a sample to all monitors; returns its TCP error.
