@@ -433,8 +433,7 @@ fn chain_arm(parts: usize, motion: Arc<dyn PrescribedMotion>) -> Plant {
         .collect();
     let soft = substitute(&whole_links(), &links).expect("fits");
     let springs: Vec<(String, Spring)> = soft
-        .springs
-        .iter()
+        .joints()
         .map(|s| (s.joint.clone(), Spring::from((s.joint.clone(), s.K_S, Damping::StiffnessProportional(1e-3)))))
         .collect();
     arm_of(&soft.mechanism, &springs, motion)

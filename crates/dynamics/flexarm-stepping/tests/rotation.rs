@@ -77,7 +77,7 @@ fn rotor(beam: &BeamLink, form: LinkForm) -> Plant {
     };
     let flexible = FlexibleLink { form, ..FlexibleLink::new("beam", beam.reduce().unwrap()) };
     let soft = substitute(&root, &[flexible]).unwrap();
-    let chain = soft.springs.iter().map(|s| (s.joint.clone(), Spring::from((s.joint.clone(), s.K_S, undamped))));
+    let chain = soft.joints().map(|s| (s.joint.clone(), Spring::from((s.joint.clone(), s.K_S, undamped))));
     let springs: Vec<(String, Spring)> = modal.into_iter().chain(chain).collect();
     arm_of(&soft.mechanism, &springs, Arc::new(Held(vec![0.0])))
 }

@@ -6,6 +6,10 @@
 //! in the middle this is exact ([`cut_inertia`], [`cut_chain`]). A link that is heavy at one end,
 //! or more compact than its beam, has no such parts: only a share of its mass then lies along the
 //! beam, and the rest is fixed to the two ends ([`share_inertia`]).
+//!
+//! All vectors and inertias are in link axes, points from the link's origin (m); positions `x`
+//! along the line are fractions of A-B. Inertias are about centres of mass. Not here: parts cut
+//! from a mesh (`flexarm_fem::chain`).
 
 use flexarm_fem::RigidPart;
 use flexarm_kinematics::{LinkInertia, skew};
@@ -29,39 +33,51 @@ pub struct CutError {
     pub mass: f64,
 }
 
-/// Divides a link at the fraction `split` of the line from `p_LA` to `p_LB` (link axes, m); returns
-/// the proximal and the distal part, or `None` if no two such bodies make up the link.
-pub fn cut_inertia(link: &LinkInertia, p_LA: &Vector3<f64>, p_LB: &Vector3<f64>, split: f64) -> Option<[RigidPart; 2]> {
-    let line = p_LB - p_LA;
-    let found = (link.com - p_LA).dot(&line) / line.norm_squared();
-    let (low, high) = (0.5 * split, 0.5 * (1.0 + split));
-    if !(found > low && found < high) {
-        return None;
-    }
-    let distal_mass = link.mass * (found - low) / (high - low);
-    let masses = [link.mass - distal_mass, distal_mass];
-    // Both parts have the same offset from the line as the link.
-    let coms = [low, high].map(|fraction| link.com + line * (fraction - found));
+/// Position of a point along the line A-B, 0 at A and 1 at B.
+fn fraction(p_LP: &Vector3<f64>, p_LA: &Vector3<f64>, p_AB: &Vector3<f64>) -> f64 {
+    (p_LP - p_LA).dot(p_AB) / p_AB.norm_squared()
+}
 
-    // Inertia left after the point masses, by the parallel axis theorem.
-    let mut rest = link.inertia_com;
-    for (mass, com) in masses.iter().zip(&coms) {
-        let c = skew(&(com - link.com));
-        rest += c * c * *mass;
-    }
-    if rest.symmetric_eigenvalues().min() <= 0.0 {
+/// Divides a link at one point of the line A-B into a proximal and a distal part.
+///
+/// ```text
+/// x_1 = s/2,  x_2 = (1 + s)/2        m_2 = m (x_c - x_1)/(x_2 - x_1),  m_1 = m - m_2
+/// ```
+/// with the split s, the middles `x_k` of the two pieces and the centre of mass `x_c` of the link.
+/// Both parts have the link's offset from the line.
+///
+/// * `p_LA`, `p_LB`: ends of the line, from the link's origin, link axes (m).
+/// * `split`: fraction of A-B, between 0 and 1.
+///
+/// Returns the two parts in link axes, or `None` if the link's centre of mass is not between the
+/// middles of the pieces, or its inertia is less than that of the two masses.
+pub fn cut_inertia(link: &LinkInertia, p_LA: &Vector3<f64>, p_LB: &Vector3<f64>, split: f64) -> Option<[RigidPart; 2]> {
+    let p_AB = p_LB - p_LA;
+    let x_c = fraction(&link.com, p_LA, &p_AB);
+    let (x_1, x_2) = (0.5 * split, 0.5 * (1.0 + split));
+    if !(x_c > x_1 && x_c < x_2) {
         return None;
     }
-    let part = |k: usize| RigidPart { mass: masses[k], com: coms[k], inertia: rest * (masses[k] / link.mass) };
-    Some([part(0), part(1)])
+    let distal_mass = link.mass * (x_c - x_1) / (x_2 - x_1);
+    let masses = [link.mass - distal_mass, distal_mass];
+    let coms = [x_1, x_2].map(|x| link.com + p_AB * (x - x_c));
+    bodies(link, &masses, &coms)?.try_into().ok()
 }
 
 /// Distributes the link's own mass properties over the parts of a chain, as [`cut_inertia`] does
 /// for two.
 ///
-/// Masses are those of the chain, weighted linearly along A-B so that the centre of mass is that of
-/// the link. All parts have the link's offset from the line, and the remaining inertia is shared in
-/// proportion to mass. Returns `None` if no such bodies make up the link.
+/// ```text
+/// m_k = m μ_k/μ (1 + (x_c - x̄)/σ² (x_k - x̄))
+/// ```
+/// The masses `μ_k` of the chain, with mean position x̄ and variance σ² along A-B, get a weight that
+/// is linear along the line, so that their centre of mass is `x_c`, that of the link.
+///
+/// * `p_LA`, `p_LB`: ends of the line, from the link's origin, link axes (m).
+/// * `chain`: at least two parts at different positions along A-B, link axes.
+///
+/// Returns one body per part in link axes, or `None` if a mass would not be positive, or the link's
+/// inertia is less than that of the masses.
 pub fn cut_chain(
     link: &LinkInertia,
     p_LA: &Vector3<f64>,
@@ -69,31 +85,40 @@ pub fn cut_chain(
     chain: &[RigidPart],
 ) -> Option<Vec<RigidPart>> {
     // Distribution of the chain's mass along A-B: total, mean and variance of the position.
-    let line = p_LB - p_LA;
-    let fraction = |p: &Vector3<f64>| (p - p_LA).dot(&line) / line.norm_squared();
-    let whole: f64 = chain.iter().map(|p| p.mass).sum();
-    let places: Vec<f64> = chain.iter().map(|p| fraction(&p.com)).collect();
-    let mean = chain.iter().zip(&places).map(|(p, x)| p.mass * x).sum::<f64>() / whole;
-    let spread = chain.iter().zip(&places).map(|(p, x)| p.mass * (x - mean).powi(2)).sum::<f64>() / whole;
-    let found = fraction(&link.com);
-    let tilt = (found - mean) / spread;
+    let p_AB = p_LB - p_LA;
+    let mu: f64 = chain.iter().map(|p| p.mass).sum();
+    let x: Vec<f64> = chain.iter().map(|p| fraction(&p.com, p_LA, &p_AB)).collect();
+    let mean = chain.iter().zip(&x).map(|(p, x)| p.mass * x).sum::<f64>() / mu;
+    let variance = chain.iter().zip(&x).map(|(p, x)| p.mass * (x - mean).powi(2)).sum::<f64>() / mu;
+
+    let x_c = fraction(&link.com, p_LA, &p_AB);
+    let tilt = (x_c - mean) / variance;
     let masses: Vec<f64> =
-        chain.iter().zip(&places).map(|(p, x)| p.mass * link.mass / whole * (1.0 + tilt * (x - mean))).collect();
+        chain.iter().zip(&x).map(|(p, x)| p.mass * link.mass / mu * (1.0 + tilt * (x - mean))).collect();
     if masses.iter().any(|m| *m <= 0.0) {
         return None;
     }
-    let coms: Vec<Vector3<f64>> = places.iter().map(|x| link.com + line * (x - found)).collect();
-    // Inertia left after the point masses, by the parallel axis theorem.
+    let coms: Vec<Vector3<f64>> = x.iter().map(|x| link.com + p_AB * (x - x_c)).collect();
+    bodies(link, &masses, &coms)
+}
+
+/// Returns bodies with these masses and centres of mass that together are the link; `None` if the
+/// inertia left by the point masses is not positive definite.
+///
+/// ```text
+/// I_k = m_k/m (I - Σ m_j (|d_j|² 1 - d_j d_jᵀ)),    d_j = c_j - c        (parallel axes)
+/// ```
+fn bodies(link: &LinkInertia, masses: &[f64], coms: &[Vector3<f64>]) -> Option<Vec<RigidPart>> {
     let mut rest = link.inertia_com;
-    for (mass, com) in masses.iter().zip(&coms) {
-        let c = skew(&(com - link.com));
-        rest += c * c * *mass;
+    for (mass, com) in masses.iter().zip(coms) {
+        let d = skew(&(com - link.com));
+        rest += d * d * *mass;
     }
     if rest.symmetric_eigenvalues().min() <= 0.0 {
         return None;
     }
-    let parts = masses.iter().zip(&coms);
-    Some(parts.map(|(&mass, &com)| RigidPart { mass, com, inertia: rest * (mass / link.mass) }).collect())
+    let body = |(&mass, &com): (&f64, &Vector3<f64>)| RigidPart { mass, com, inertia: rest * (mass / link.mass) };
+    Some(masses.iter().zip(coms).map(body).collect())
 }
 
 /// A link as a beam with bodies fixed to its ends.
@@ -129,6 +154,8 @@ pub fn share_inertia(link: &LinkInertia, halves: [&RigidPart; 2]) -> Result<Shar
     let second = |I: &Matrix3<f64>| Matrix3::from_diagonal_element(0.5 * I.trace()) - I;
     let obeys = least(&second(&link.inertia_com)) > 0.0;
     let is_body = |s: f64| least(&if obeys { second(&rest(s)) } else { rest(s) }) >= 0.0;
+
+    // Largest share by bisection, to the last bit.
     let (mut share, mut high) = (0.0, SHARES[1]);
     for _ in 0..60 {
         let middle = 0.5 * (share + high);
@@ -137,6 +164,7 @@ pub fn share_inertia(link: &LinkInertia, halves: [&RigidPart; 2]) -> Result<Shar
     if share < SHARES[0] {
         return Err(CutError { share, mass });
     }
+
     let com = (link.com - beam.com * share) / (1.0 - share);
     // The centres of the two parts are half of the beam apart.
     let apart = halves[1].com - halves[0].com;

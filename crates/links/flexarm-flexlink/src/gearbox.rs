@@ -20,9 +20,13 @@
 //! ```text
 //! parent --joint--> <joint>__motor --back--> <joint>__middle --springs--> <joint>__tilted --forth--> child
 //! ```
+//! Start at [`insert_gearboxes`]. Not here: damping, play, curves and friction of the springs, which
+//! the tree does not know (`flexarm-stepping`).
 
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, Mechanism, Mimic, Pose};
 use nalgebra::{DMatrix, Matrix6, Vector3};
+
+use crate::stiffness::{StiffnessError, spring_stiffness};
 
 /// Stiffness of a gearbox on the joint side.
 #[derive(Clone, Debug, PartialEq)]
@@ -105,49 +109,66 @@ pub struct GearSpring {
     pub K: DMatrix<f64>,
 }
 
-/// Reason why a gearbox is invalid, with the name of its joint.
+/// Reason why a gearbox is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct GearboxError(String);
-
-fn invalid(joint: &str, what: &str) -> GearboxError {
-    GearboxError(format!("gearbox of joint {joint:?}: {what}"))
+#[error("gearbox of joint {joint:?}: {fault}")]
+pub struct GearboxError {
+    /// Name of the joint.
+    pub joint: String,
+    /// What is wrong.
+    #[source]
+    pub fault: GearboxFault,
 }
 
-fn not_positive(joint: &str, found: f64) -> GearboxError {
-    invalid(joint, &format!("its stiffness must be positive (definite), found {found:e} as its smallest value"))
+/// What is wrong with a gearbox.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum GearboxFault {
+    /// There is no joint of this name, or it is fixed and has a single spring.
+    #[error("the robot has no such movable joint")]
+    NoJoint,
+    /// The joint is a dependent one of the loop of this name.
+    #[error("the joint follows from loop {0:?}, so nothing drives it")]
+    Dependent(String),
+    /// Springs about three axes at a joint that slides.
+    #[error("three stiffnesses are about the axes of a turning joint; this one slides")]
+    Slides,
+    /// A guide at a joint without tubes, or one that tilts about no axis.
+    #[error("only a prismatic joint has tubes that slide, and a guide tilts about one axis at least")]
+    NoTubes,
+    /// A single stiffness is zero, negative or not finite.
+    #[error("its stiffness must be positive and finite, found {0:e}")]
+    NotPositive(f64),
+    /// The 6×6 stiffness is that of no spring.
+    #[error("its stiffness: {0}")]
+    Stiffness(#[from] StiffnessError),
 }
 
-/// Maximum relative asymmetry of a full stiffness.
-pub(crate) const ASYMMETRY: f64 = 1e-9;
-
-fn check_stiffness(joint: &str, stiffness: &GearStiffness) -> Result<(), GearboxError> {
-    let smallest = match stiffness {
-        GearStiffness::Axis(k) => *k,
-        GearStiffness::Tilting(k) => smallest_of(k),
-        GearStiffness::Separate(k) => smallest_of(k),
-        GearStiffness::Full(K) => match K.iter().find(|k| !k.is_finite()) {
-            Some(hole) => *hole,
-            None => {
-                let found = (K - K.transpose()).amax() / K.amax();
-                if found > ASYMMETRY {
-                    let must = "its 6x6 stiffness must be symmetric, found a relative asymmetry of";
-                    return Err(invalid(joint, &format!("{must} {found:.1e}")));
-                }
-                K.symmetric_eigenvalues().min()
-            }
-        },
-        GearStiffness::Guide(_) => 1.0,
-    };
-    if smallest <= 0.0 || !smallest.is_finite() {
-        return Err(not_positive(joint, smallest));
+/// Checks that a gearbox fits its joint and that its springs are stiff in all directions.
+fn check(mechanism: &Mechanism, gearbox: &Gearbox) -> Result<(), GearboxFault> {
+    let name = &gearbox.joint;
+    if let Some(closure) = mechanism.loops.iter().find(|closure| closure.dependent.contains(name)) {
+        return Err(GearboxFault::Dependent(closure.name.clone()));
     }
-    Ok(())
-}
-
-/// Returns the smallest of the numbers, or the first that is not finite.
-fn smallest_of(k: &[f64]) -> f64 {
-    k.iter().copied().find(|k| !k.is_finite()).unwrap_or_else(|| k.iter().copied().fold(f64::INFINITY, f64::min))
+    // A fixed joint with several springs is an elastic connection.
+    let several = !matches!(gearbox.stiffness, GearStiffness::Axis(_));
+    let kind = mechanism.joint(name).ok_or(GearboxFault::NoJoint)?.kind;
+    if kind.spring().is_none() && !(several && kind == JointKind::Fixed) {
+        return Err(GearboxFault::NoJoint);
+    }
+    match &gearbox.stiffness {
+        GearStiffness::Tilting(_) if kind.slides() => return Err(GearboxFault::Slides),
+        GearStiffness::Guide(tubes) if !matches!(kind, JointKind::Prismatic(_)) || !tubes.tilts.contains(&true) => {
+            return Err(GearboxFault::NoTubes);
+        }
+        GearStiffness::Full(K) => drop(spring_stiffness(K)?),
+        _ => {}
+    }
+    let single = gearbox.stiffness.each().unwrap_or_default().iter().chain(gearbox.seat.iter().flatten());
+    match single.copied().find(|k| !(*k > 0.0 && k.is_finite())) {
+        Some(found) => Err(GearboxFault::NotPositive(found)),
+        None => Ok(()),
+    }
 }
 
 /// Inserts the joints from the moving end of a sliding joint to the middle of the overlap of its
@@ -193,36 +214,14 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
     let mut springs = Vec::new();
     for gearbox in gearboxes {
         let name = &gearbox.joint;
-        let missing = || invalid(name, "the robot has no such movable joint");
-        if let Some(closure) = mechanism.loops.iter().find(|closure| closure.dependent.contains(name)) {
-            let what = format!("the joint follows from loop {:?}, so nothing drives it", closure.name);
-            return Err(invalid(name, &what));
-        }
-        let joint = mechanism.joints.iter_mut().find(|j| j.name == *name).ok_or_else(missing)?;
-        let several = !matches!(gearbox.stiffness, GearStiffness::Axis(_));
-        // A fixed joint with several springs is an elastic connection.
-        let along = joint.kind.spring();
-        if along.is_none() && !(several && joint.kind == JointKind::Fixed) {
-            return Err(missing());
-        }
-        if joint.kind.slides() && matches!(gearbox.stiffness, GearStiffness::Tilting(_)) {
-            return Err(invalid(name, "three stiffnesses are about the axes of a turning joint; this one slides"));
-        }
-        check_stiffness(name, &gearbox.stiffness)?;
-        let found = gearbox.seat.map_or(1.0, |seat| smallest_of(&seat));
-        if found <= 0.0 || !found.is_finite() {
-            return Err(not_positive(name, found));
-        }
-        if let GearStiffness::Guide(tubes) = &gearbox.stiffness
-            && !(matches!(joint.kind, JointKind::Prismatic(_)) && tubes.tilts.contains(&true))
-        {
-            let needs = "only a prismatic joint has tubes that slide, and a guide tilts about one axis at least";
-            return Err(GearboxError(format!("guide of joint {name:?}: {needs}")));
-        }
+        check(mechanism, gearbox).map_err(|fault| GearboxError { joint: name.clone(), fault })?;
+        let Some(joint) = mechanism.joints.iter_mut().find(|j| j.name == *name) else { continue };
+        // The motor's joint ends at a new link; the springs lead on to the child.
         let slide = joint.clone();
         let motor = format!("{name}__motor");
         let child = std::mem::replace(&mut joint.child, motor.clone());
         mechanism.links.push(Link { name: motor.clone(), inertia: None });
+        // The seat takes the joint's place in the parent: two springs across the axis, then the joint.
         let seat = gearbox.seat.map(|k| {
             let seated = format!("{name}__seated");
             let parent = std::mem::replace(&mut joint.parent, seated.clone());
@@ -240,7 +239,7 @@ pub fn insert_gearboxes(mechanism: &mut Mechanism, gearboxes: &[Gearbox]) -> Res
             let behind = |spring: GearSpring| GearSpring { component: spring.component + SEATED, ..spring };
             springs.extend(seated.into_iter().map(behind));
         }
-        let parts = spring_joints(&gearbox.stiffness, along);
+        let parts = spring_joints(&gearbox.stiffness, slide.kind.spring());
         let (parent, child) = match &gearbox.stiffness {
             GearStiffness::Guide(tubes) => there_and_back(mechanism, &slide, tubes, motor, child),
             _ => (motor, child),

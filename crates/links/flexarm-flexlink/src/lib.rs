@@ -27,7 +27,7 @@
 //! let section = Section::Tube { outer_diameter: 0.1, wall: 0.005 };
 //! let reduced = BeamLink::new("boom", section, Material::STEEL, 1.0).reduce()?;
 //! let flexible = substitute(&arm, &[FlexibleLink::new("boom", reduced)])?;
-//! assert_eq!(flexible.springs[0].joint, "boom__elastic");
+//! assert_eq!(flexible.spans[0].joints[0].joint, "boom__elastic");
 //! assert_eq!(Model::new(&flexible.mechanism)?.nv(), 1 + 6);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -38,14 +38,16 @@ mod gearbox;
 mod interfaces;
 mod modal;
 mod mounting;
+mod stiffness;
 mod substitute;
 
 pub use cut::{CutError, SharedInertia, cut_chain, cut_inertia, share_inertia};
 pub use flexarm_fem::ReducedLink;
-pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, GuideTubes, SEAT, insert_gearboxes};
+pub use gearbox::{GearSpring, GearStiffness, Gearbox, GearboxError, GearboxFault, GuideTubes, SEAT, insert_gearboxes};
 pub use interfaces::{BranchJoint, branch_joints};
 pub use modal::modal_body;
 pub use mounting::{Mounting, MountingError, base_link, insert_mounting};
+pub use stiffness::{StiffnessError, spring_stiffness};
 pub use substitute::{
     ElasticJoint, FlexibleLink, FlexibleSpan, LinkForm, Parts, Substituted, SubstitutionError, distal_joint, substitute,
 };

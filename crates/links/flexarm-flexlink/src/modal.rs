@@ -1,4 +1,9 @@
 //! Modal links on the tree: one body with its interfaces.
+//!
+//! The body keeps name and frame of the link L, in which all mass integrals and shapes are given
+//! (linear first). Each interface except A becomes a child link without coordinates of its own, in
+//! link axes. Not here: computation of modes and integrals (`flexarm-fem`), their dynamics
+//! (`flexarm-kinematics`).
 
 use std::sync::Arc;
 
@@ -53,14 +58,15 @@ pub(crate) fn substitute_modal(
     modal: &Arc<ModalLink>,
 ) -> Result<FlexibleSpan, SubstitutionError> {
     let (name, reduced) = (&flexible.link, &flexible.reduced);
-    let fail = |what: String| cannot_bend(name, &what);
-    // Check that the first interface is at B.
+    let fail = |what: String| SubstitutionError::NotModal { link: name.clone(), what };
+    // The first interface must be at B.
     let Some(far) = modal.interfaces.first() else { return Err(fail("it has one interface only".into())) };
     let distance = (far.X_LI.translation.vector - site.p_LB).norm();
     if distance > AT_INTERFACE * site.length {
         return Err(fail(format!("its interface {:?} lies {distance:.3e} m from B of the reduced link", far.name)));
     }
     let mut body = modal_body(modal);
+    // Masses: those of the modal body, or those of the link, as a whole or shared with its two ends.
     let (mut share, mut ends) = (1.0, attached_bodies(flexible, site));
     if let Parts::FromLink(_) = flexible.parts
         && !take_mass_integrals(&mut body, name, site)?
@@ -71,6 +77,7 @@ pub(crate) fn substitute_modal(
         ends = divided.ends.map(|part| (part.mass > 0.0).then(|| inertia_of(&part).spatial()));
     }
 
+    // The body at A stays on the link; that at B goes to the child link of the first interface.
     let [near, beyond] = ends;
     for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
         link.inertia = near.map(rigid);
@@ -84,15 +91,12 @@ pub(crate) fn substitute_modal(
         distal_link: format!("{name}__distal"),
         X_LA: reduced.X_LA,
         X_DB: Pose::from(far.X_LI.translation).inverse() * reduced.X_LB,
+        joints: Vec::new(),
         length: site.length,
         part_masses,
         lumped: None,
         share,
     })
-}
-
-fn cannot_bend(link: &str, what: &str) -> SubstitutionError {
-    SubstitutionError::Unfit(format!("link {link:?} cannot bend in modes: {what}"))
 }
 
 /// Replaces the mass integrals of the undeformed body by those of the mechanism's link; returns
@@ -101,7 +105,7 @@ fn take_mass_integrals(body: &mut ModalBody, name: &str, site: &Site) -> Result<
     let own = site.own(name)?.spatial();
     if (own.mass / body.mass - 1.0).abs() > 1e-9 {
         let what = format!("it weighs {} kg, the link {} kg", body.mass, own.mass);
-        return Err(cannot_bend(name, &what));
+        return Err(SubstitutionError::NotModal { link: name.to_owned(), what });
     }
     let before = (body.first_moment, body.inertia);
     (body.first_moment, body.inertia) = (own.first_moment, own.rotational);

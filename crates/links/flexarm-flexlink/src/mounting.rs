@@ -11,7 +11,8 @@
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::Matrix6;
 
-use crate::gearbox::{ASYMMETRY, GearSpring, GearStiffness, insert_springs, spring_joints};
+use crate::gearbox::{GearSpring, GearStiffness, insert_springs, spring_joints};
+use crate::stiffness::{StiffnessError, spring_stiffness};
 use crate::substitute::FlexibleSpan;
 
 /// Springs below the base.
@@ -32,54 +33,44 @@ pub struct Mounting {
     pub inertia: Option<LinkInertia>,
 }
 
-/// Reason why a mounting is invalid, with its name.
+/// Reason why a mounting is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("mounting {0:?}: {1}")]
-pub struct MountingError(String, String);
-
-fn invalid(mounting: &str, what: impl Into<String>) -> MountingError {
-    MountingError(mounting.to_owned(), what.into())
+#[non_exhaustive]
+pub enum MountingError {
+    /// The tree has no root, or several.
+    #[error("mounting {mounting:?}: the robot has no single base link to stand on it, found {roots:?}")]
+    NoSingleBase {
+        /// Name of the mounting.
+        mounting: String,
+        /// Links without parent joint.
+        roots: Vec<String>,
+    },
+    /// The robot has a link of this name.
+    #[error("mounting {0:?}: the robot has a link of that name; call the mounting otherwise with name = \"...\"")]
+    NameTaken(String),
+    /// The stiffness is that of no spring.
+    #[error("mounting {mounting:?}: stiffness: {source}")]
+    Stiffness {
+        /// Name of the mounting.
+        mounting: String,
+        /// Cause.
+        source: StiffnessError,
+    },
 }
 
-/// Returns the link without parent joint.
+/// Returns the link without parent joint; `mounting` is the name in messages.
 ///
 /// # Errors
-/// [`MountingError`] if there is not exactly one.
+/// [`MountingError::NoSingleBase`].
 pub fn base_link<'m>(mechanism: &'m Mechanism, mounting: &str) -> Result<&'m Link, MountingError> {
     let carried = |link: &Link| mechanism.joints.iter().any(|joint| joint.child == link.name);
     let roots: Vec<&Link> = mechanism.links.iter().filter(|link| !carried(link)).collect();
     match roots[..] {
         [one] => Ok(one),
         _ => {
-            let roots: Vec<&String> = roots.iter().map(|link| &link.name).collect();
-            let what = format!("the robot has no single base link to stand on it, found {roots:?}");
-            Err(invalid(mounting, what))
+            let roots = roots.iter().map(|link| link.name.clone()).collect();
+            Err(MountingError::NoSingleBase { mounting: mounting.to_owned(), roots })
         }
-    }
-}
-
-fn check_stiffness(name: &str, K: &Matrix6<f64>) -> Result<(), MountingError> {
-    let not_positive = |found: f64| {
-        let must = "its stiffness must be finite and positive definite";
-        Err(invalid(name, format!("{must}, found {found:e} as its smallest value")))
-    };
-    if let Some(hole) = K.iter().find(|k| !k.is_finite()) {
-        return not_positive(*hole);
-    }
-    let asymmetry = (K - K.transpose()).amax() / K.amax();
-    if asymmetry > ASYMMETRY {
-        let must = "its 6x6 stiffness must be symmetric";
-        return Err(invalid(name, format!("{must}, found a relative asymmetry of {asymmetry:.1e}")));
-    }
-    // Forces and moments have different units, so the matrix is scaled to a unit diagonal.
-    let diagonal = K.diagonal();
-    if diagonal.min() <= 0.0 {
-        return not_positive(diagonal.min());
-    }
-    let scaled = Matrix6::from_fn(|i, j| K[(i, j)] / (diagonal[i] * diagonal[j]).sqrt());
-    match scaled.symmetric_eigenvalues().min() {
-        least if least > 1e-12 => Ok(()),
-        least => not_positive(least),
     }
 }
 
@@ -95,11 +86,10 @@ pub fn insert_mounting(
     let Mounting { name, X_BS, K_S, separate, inertia } = mounting;
     let top = format!("{name}__top");
     if let Some(taken) = [name, &top].into_iter().find(|name| mechanism.link(name).is_some()) {
-        let mend = "call the mounting otherwise with name = \"...\"";
-        return Err(invalid(taken, format!("the robot has a link of that name; {mend}")));
+        return Err(MountingError::NameTaken(taken.clone()));
     }
     let base = base_link(mechanism, name)?.name.clone();
-    check_stiffness(name, K_S)?;
+    spring_stiffness(K_S).map_err(|source| MountingError::Stiffness { mounting: name.clone(), source })?;
     mechanism.links.push(Link { name: name.clone(), inertia: None });
     mechanism.links.push(Link { name: top.clone(), inertia: *inertia });
     let stiffness = match separate {
@@ -115,6 +105,7 @@ pub fn insert_mounting(
         distal_link: top,
         X_LA: *X_BS,
         X_DB: Pose::identity(),
+        joints: Vec::new(),
         length: 0.0,
         part_masses: vec![mass],
         share: 1.0,

@@ -1,4 +1,10 @@
 //! Replacement of a link by rigid parts connected by elastic joints, or by a modal body.
+//!
+//! Start at [`substitute`]. The proximal part keeps name and frame of the link L; the frame of every
+//! other part is at the elastic joint S inward of it, in S axes. A and B are the interfaces of the
+//! reduced link, D is the part that carries B. Linear first, SI units.
+//! Not here: masses cut from the link's own inertia ([`crate::cut_chain`]), modal bodies
+//! (`modal.rs`), the stiffness itself (`flexarm-fem`).
 
 use std::sync::Arc;
 
@@ -7,7 +13,7 @@ use flexarm_fem::{ModalLink, ReducedLink, RigidPart, drop_coupling};
 use flexarm_kinematics::{ElasticAngles, Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use nalgebra::{Matrix6, Vector3};
 
-use crate::cut::{SharedInertia, cut_chain, cut_inertia, share_inertia};
+use crate::cut::{CutError, SharedInertia, cut_chain, cut_inertia, share_inertia};
 use crate::interfaces::{BranchJoint, branch_joints};
 use crate::modal::substitute_modal;
 
@@ -87,8 +93,6 @@ pub enum Parts {
 /// symmetric and positive definite, and so do the steppers.
 #[derive(Clone, Debug)]
 pub struct ElasticJoint {
-    /// Name of the flexible link.
-    pub link: String,
     /// Name of the elastic joint.
     pub joint: String,
     /// Name of the distal part.
@@ -110,6 +114,8 @@ pub struct FlexibleSpan {
     pub X_LA: Pose,
     /// Pose of B in the distal link.
     pub X_DB: Pose,
+    /// Elastic joints of a lumped link, proximal first; none for a modal link and a mounting.
+    pub joints: Vec<ElasticJoint>,
     /// Distance between the interfaces (m).
     pub length: f64,
     /// Masses of the parts, proximal first (kg); for a modal link, the modal body first.
@@ -125,10 +131,15 @@ pub struct FlexibleSpan {
 pub struct Substituted {
     /// Tree with elastic joints.
     pub mechanism: Mechanism,
-    /// Elastic joints of lumped links, in the order given, proximal first.
-    pub springs: Vec<ElasticJoint>,
     /// One per flexible link, in the order given.
     pub spans: Vec<FlexibleSpan>,
+}
+
+impl Substituted {
+    /// Returns the elastic joints of all lumped links, in the order given, proximal first.
+    pub fn joints(&self) -> impl Iterator<Item = &ElasticJoint> {
+        self.spans.iter().flat_map(|span| &span.joints)
+    }
 }
 
 /// Reason why a link cannot be made flexible.
@@ -151,20 +162,75 @@ pub enum SubstitutionError {
         /// Its child joints.
         children: Vec<String>,
     },
-    /// A link, its reduced form or its joints do not fit the mechanism: what was found, and the
-    /// remedy.
-    #[error("{0}")]
-    Unfit(String),
+    /// The joint named as distal starts at another link.
+    #[error("distal joint {joint:?} does not start at link {link:?}; its joints are {children:?}")]
+    NotAChild {
+        /// The link.
+        link: String,
+        /// Joint named as distal.
+        joint: String,
+        /// Child joints of the link.
+        children: Vec<String>,
+    },
+    /// Two entries are about the same link.
+    #[error("flexible link {0:?} is listed twice")]
+    Twice(String),
+    /// Interface B of the reduced link is not at the distal joint.
+    #[error(
+        "link {link:?}: interface B of the reduced link lies {distance:.3e} m from joint {joint:?}: check units and \
+         frames of the reduced link"
+    )]
+    NotAtJoint {
+        /// The link.
+        link: String,
+        /// The distal joint.
+        joint: String,
+        /// Distance of B from the joint (m).
+        distance: f64,
+    },
+    /// A joint of a lumped link is at an interface other than its two ends.
+    #[error(
+        "joint {joint:?} hangs on interface {interface:?} of link {link:?}, which is neither its near nor its far end: \
+         rigid parts with springs carry load at the two ends alone, let the link bend in modes"
+    )]
+    ThirdInterface {
+        /// The link.
+        link: String,
+        /// The joint.
+        joint: String,
+        /// Its interface.
+        interface: String,
+    },
+    /// The link has no inertia that could be divided.
+    #[error("link {0:?} has no inertia to cut: give the parts in a .flex file or use parts = \"uniform\"")]
+    NoInertia(String),
+    /// The inertia of the link cannot be divided among a beam and its ends.
+    #[error("the mass of link {link:?} cannot be spread along it: {source}")]
+    Cut {
+        /// The link.
+        link: String,
+        /// Cause.
+        source: CutError,
+    },
+    /// The modal body has no interface at B, or another mass than the link.
+    #[error("link {link:?} cannot bend in modes: {what}")]
+    NotModal {
+        /// The link.
+        link: String,
+        /// What was found and expected.
+        what: String,
+    },
 }
 
 /// Maximum distance of the reduced link's B from the joint, relative to the link's length.
 const INTERFACE_TOLERANCE: f64 = 1e-6;
 
-/// Finds the joint at the distal interface of a link.
+/// Finds the joint at the distal interface of a link: the one named, or else the only moving child,
+/// or else the only child.
 ///
 /// # Errors
 /// [`SubstitutionError::UnknownLink`], [`SubstitutionError::DistalUnclear`], or
-/// [`SubstitutionError::Unfit`] if the named joint does not start at the link.
+/// [`SubstitutionError::NotAChild`] for a named joint elsewhere.
 pub fn distal_joint<'m>(
     mechanism: &'m Mechanism,
     link: &'m str,
@@ -176,15 +242,15 @@ pub fn distal_joint<'m>(
     }
     let children: Vec<&Joint> = mechanism.child_joints(link).collect();
     let names = || children.iter().map(|j| j.name.clone()).collect::<Vec<_>>();
-    let moving: Vec<&&Joint> = children.iter().filter(|j| j.kind != JointKind::Fixed).collect();
+    let moving: Vec<&Joint> = children.iter().copied().filter(|j| j.kind != JointKind::Fixed).collect();
     match named {
-        Some(joint) => children.iter().find(|j| j.name == joint).copied().ok_or_else(|| {
-            let (joints, start) = (names(), "does not start at link");
-            SubstitutionError::Unfit(format!("distal joint {joint:?} {start} {link:?}; its joints are {joints:?}"))
+        Some(joint) => children.iter().find(|j| j.name == joint).copied().ok_or_else(|| SubstitutionError::NotAChild {
+            link: link.to_owned(),
+            joint: joint.to_owned(),
+            children: names(),
         }),
         None => match (moving.as_slice(), children.as_slice()) {
-            ([one], _) => Ok(one),
-            ([], [one]) => Ok(one),
+            ([one], _) | ([], [one]) => Ok(one),
             _ => Err(SubstitutionError::DistalUnclear { link: link.to_owned(), children: names() }),
         },
     }
@@ -201,30 +267,24 @@ pub fn distal_joint<'m>(
 /// # Errors
 /// [`SubstitutionError`] with the name of the link.
 pub fn substitute(mechanism: &Mechanism, links: &[FlexibleLink]) -> Result<Substituted, SubstitutionError> {
-    let mut result = Substituted { mechanism: mechanism.clone(), springs: Vec::new(), spans: Vec::new() };
+    let mut result = Substituted { mechanism: mechanism.clone(), spans: Vec::new() };
     result.mechanism.keep_coordinate_order();
     for (i, flexible) in links.iter().enumerate() {
-        if links[..i].iter().any(|other| other.link == flexible.link) {
-            return Err(SubstitutionError::Unfit(format!("flexible link {:?} is listed twice", flexible.link)));
+        let name = &flexible.link;
+        if links[..i].iter().any(|other| other.link == *name) {
+            return Err(SubstitutionError::Twice(name.clone()));
         }
         let site = Site::new(&result.mechanism, flexible)?;
-        let span = match &flexible.form {
+        result.spans.push(match &flexible.form {
             LinkForm::Modal(modal) => substitute_modal(&mut result.mechanism, flexible, &site, modal)?,
             LinkForm::TwoParts | LinkForm::Chain(_) => {
                 if let Some(BranchJoint { joint, interface }) = branch_joints(mechanism, flexible).into_iter().next() {
-                    return Err(SubstitutionError::Unfit(format!(
-                        "joint {joint:?} hangs on interface {interface:?} of link {:?}, which is neither its near nor its \
-                         far end: rigid parts with springs carry load at the two ends alone, let the link bend in modes",
-                        flexible.link
-                    )));
+                    return Err(SubstitutionError::ThirdInterface { link: name.clone(), joint, interface });
                 }
                 let chain = lumped_parts(flexible, &site)?;
-                let (span, springs) = insert_chain(&mut result.mechanism, flexible, &site, chain);
-                result.springs.extend(springs);
-                span
+                insert_chain(&mut result.mechanism, flexible, &site, chain)
             }
-        };
-        result.spans.push(span);
+        });
     }
     Ok(result)
 }
@@ -246,11 +306,7 @@ impl Site {
         let length = (p_LB - p_LA).norm();
         let distance = (distal.X_PJ.translation.vector - p_LB).norm();
         if distance > INTERFACE_TOLERANCE * length {
-            return Err(SubstitutionError::Unfit(format!(
-                "link {name:?}: interface B of the reduced link lies {distance:.3e} m from joint {:?}: check units and \
-                 frames of the reduced link",
-                distal.name
-            )));
+            return Err(SubstitutionError::NotAtJoint { link: name.clone(), joint: distal.name.clone(), distance });
         }
         let own = mechanism.link(name).and_then(|l| l.inertia);
         Ok(Self { distal_joint: distal.name.clone(), p_LA, p_LB, length, own })
@@ -258,22 +314,19 @@ impl Site {
 
     /// Returns the mechanism's own inertia of the link.
     pub(crate) fn own(&self, link: &str) -> Result<LinkInertia, SubstitutionError> {
-        self.own.ok_or_else(|| {
-            let mend = "give the parts in a .flex file or use parts = \"uniform\"";
-            SubstitutionError::Unfit(format!("link {link:?} has no inertia to cut: {mend}"))
-        })
+        self.own.ok_or_else(|| SubstitutionError::NoInertia(link.to_owned()))
     }
 }
 
 /// Divides the mechanism's own inertia of a link into its beam and bodies at its two ends.
 pub(crate) fn shared(flexible: &FlexibleLink, site: &Site) -> Result<SharedInertia, SubstitutionError> {
     let link = &flexible.link;
-    share_inertia(&site.own(link)?, [&flexible.reduced.proximal, &flexible.reduced.distal]).map_err(|error| {
-        SubstitutionError::Unfit(format!("the mass of link {link:?} cannot be spread along it: {error}"))
-    })
+    share_inertia(&site.own(link)?, [&flexible.reduced.proximal, &flexible.reduced.distal])
+        .map_err(|source| SubstitutionError::Cut { link: link.clone(), source })
 }
 
-/// Elastic joints and parts of a lumped link, proximal first.
+/// Returns the elastic joints and parts of a lumped link, proximal first: those of the reduced link,
+/// with the masses of the mechanism's link if its parts are cut from that one.
 fn lumped_parts(flexible: &FlexibleLink, site: &Site) -> Result<Chain, SubstitutionError> {
     let reduced = &flexible.reduced;
     let chain = match &flexible.form {
@@ -300,18 +353,16 @@ fn lumped_parts(flexible: &FlexibleLink, site: &Site) -> Result<Chain, Substitut
     Ok(Chain { parts, ..chain })
 }
 
-fn insert_chain(
-    mechanism: &mut Mechanism,
-    flexible: &FlexibleLink,
-    site: &Site,
-    chain: Chain,
-) -> (FlexibleSpan, Vec<ElasticJoint>) {
+/// Replaces a link by the parts of a chain; returns where its ends and elastic joints are.
+fn insert_chain(mechanism: &mut Mechanism, flexible: &FlexibleLink, site: &Site, chain: Chain) -> FlexibleSpan {
     let (name, Chain { joints, parts }) = (&flexible.link, &chain);
     // The proximal part keeps the link's frame and name; the frames of the others are at the joints
     // inward of them.
     for link in mechanism.links.iter_mut().filter(|l| l.name == *name) {
         link.inertia = Some(inertia_of(&parts[0]));
     }
+
+    // The distal joint and the children beyond the plane through the last S move to the last part.
     let last = joints.len() - 1;
     let part_name = |k: usize| {
         if k == last { format!("{name}__distal") } else { format!("{name}__part_{}", k + 2) }
@@ -320,7 +371,9 @@ fn insert_chain(
     move_children(mechanism, name, &part_name(last), &X_LD, |child, p| {
         child == site.distal_joint || (p - X_LD.translation.vector).dot(&(site.p_LB - site.p_LA)) > 0.0
     });
-    let mut springs = Vec::new();
+
+    // From part P to part Q over the elastic joint at S: X_PS = X_LP⁻¹ X_LS.
+    let mut elastic = Vec::new();
     let (mut parent, mut X_LP) = (name.clone(), Pose::identity());
     for (k, joint) in joints.iter().enumerate() {
         let distal_link = part_name(k);
@@ -330,26 +383,20 @@ fn insert_chain(
         let kind = JointKind::Elastic(flexible.angles);
         mechanism.joints.push(Joint::new(&joint_name, kind, &parent, &distal_link, X_LP.inverse() * joint.X_LS));
         let K_S = if flexible.coupling { joint.K_S } else { drop_coupling(&joint.K_S) };
-        springs.push(ElasticJoint {
-            link: name.clone(),
-            joint: joint_name,
-            distal_link: distal_link.clone(),
-            K_S,
-            X_LS: joint.X_LS,
-        });
+        elastic.push(ElasticJoint { joint: joint_name, distal_link: distal_link.clone(), K_S, X_LS: joint.X_LS });
         (parent, X_LP) = (distal_link, joint.X_LS);
     }
-    let span = FlexibleSpan {
+    FlexibleSpan {
         link: name.clone(),
         distal_link: parent,
         X_LA: flexible.reduced.X_LA,
         X_DB: X_LD.inverse() * flexible.reduced.X_LB,
+        joints: elastic,
         length: site.length,
         part_masses: parts.iter().map(|p| p.mass).collect(),
         lumped: Some(chain),
         share: 1.0,
-    };
-    (span, springs)
+    }
 }
 
 /// Moves those child joints of a link for which `moves(name, position)` holds to the link `to`,

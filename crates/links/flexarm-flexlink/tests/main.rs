@@ -6,4 +6,5 @@
 mod cut;
 mod gearbox;
 mod modal;
+mod stiffness;
 mod substitution;

@@ -43,7 +43,7 @@ fn tip_of_the_substituted_link_moves_as_the_cantilever_does() {
         let mut J = nalgebra::Matrix6xX::zeros(model.nv());
         frame_jacobian(&model, &data, &tip, &mut J);
         let J_e = J.fixed_columns::<6>(1).into_owned();
-        let C = J_e * substituted.springs[0].K_S.try_inverse().expect("stiff") * J_e.transpose();
+        let C = J_e * substituted.spans[0].joints[0].K_S.try_inverse().expect("stiff") * J_e.transpose();
         let bend = |EI: f64| (L.powi(3) / (3.0 * EI), L * L / (2.0 * EI), L / EI);
         let ((ty, cy, ry), (tz, cz, rz)) = (bend(EI_z), bend(EI_y));
         let truth = [
@@ -94,7 +94,7 @@ fn dropped_coupling_is_wrong_by_tens_of_per_cent() {
     let (arm, flexible) = cantilever(0.3);
     let deflection = |flexible: &FlexibleLink| {
         let substituted = substitute(&arm, std::slice::from_ref(flexible)).expect("fits");
-        let C = substituted.springs[0].K_S.try_inverse().expect("stiff");
+        let C = substituted.spans[0].joints[0].K_S.try_inverse().expect("stiff");
         let r = 0.7 * L;
         let Ad = adjoint(&Pose::translation(-r, 0.0, 0.0));
         (Ad * C * Ad.transpose())[(1, 1)]

@@ -107,7 +107,7 @@ pub(super) fn encoder_figures(
     let model = link_side(&arm.robot().rigid)
         .map_err(|source| Error::Model { path: arm.robot().urdf_path.clone(), source: Box::new(source) })?;
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
-    let coupling = arm.robot().coupling();
+    let coupling = arm.robot().coupling.as_ref();
     let is_coupled = |joint: &String| coupling.is_some_and(|coupling| coupling.joints.contains(joint));
     let all = candidates(arm.robot(), arm);
     let filed = |joint: &String| gearbox_of(&all, joint).filter(|_| !is_coupled(joint)).map(|p| p.initial);

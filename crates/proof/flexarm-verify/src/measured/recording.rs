@@ -60,7 +60,7 @@ impl Recording {
         };
         let motor = all(|k| format!("q_motor_{k}_rad"), AXES)?;
         let low = LowPass::new(SMOOTH_HZ, 1.0 / STEP_S);
-        let ratio = |axis: usize| robot.drives.get(axis).map_or(f64::NAN, |drive| drive.ratio());
+        let ratio = |axis: usize| robot.drives.get(axis).map_or(f64::NAN, |drive| drive.ratio);
         let mut torque = all(|k| format!("tau_motor_{k}_N_m"), AXES)?;
         for (axis, torque) in torque.iter_mut().enumerate() {
             torque.iter_mut().for_each(|torque| *torque *= ratio(axis));

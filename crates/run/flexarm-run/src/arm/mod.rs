@@ -114,7 +114,7 @@ impl Arm {
         self.completed(Plant::new(self.model.clone(), springs, motion)?)
     }
 
-    /// As [`Self::arm`], for equilibria alone: links between springs need no mass.
+    /// As [`Self::plant`], for equilibria alone: links between springs need no mass.
     pub(crate) fn plant_at_rest(&self, motion: Arc<dyn PrescribedMotion>) -> Result<Plant, StepError> {
         self.completed(Plant::at_rest(self.model.clone(), self.springs.clone(), motion)?)
     }

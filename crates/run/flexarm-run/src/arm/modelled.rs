@@ -1,11 +1,16 @@
 //! Models of a robot: the form of each flexible link, and all springs, gears and drives.
+//!
+//! Start at [`Robot::model`]. Overrides and factors of the robot file on the stiffness of a link are
+//! applied here, when its springs are made. Springs are in the order of the elastic coordinates of
+//! the tree; each carries its owner from here on. Not here: substitution in the tree
+//! (`flexarm-flexlink`), the choice of a link's model ([`RobotLink::form`]), stepping.
 
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
 use flexarm_flexlink::{
-    BranchJoint, FlexibleLink, GearSpring, Gearbox, LinkForm, Substituted, branch_joints, insert_gearboxes,
-    insert_mounting, substitute,
+    BranchJoint, FlexibleLink, FlexibleSpan, GearSpring, Gearbox, LinkForm, Substituted, branch_joints,
+    insert_gearboxes, insert_mounting, substitute,
 };
 use flexarm_kinematics::{Coordinate, ElasticAngles, ElasticGroup, Model};
 use flexarm_linkmaker::import::SECOND_ORDER_UNKNOWN;
@@ -58,8 +63,7 @@ impl Robot {
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
 
-        let mut owned = self.lumped_springs(&substituted);
-        owned.extend(self.modal_springs(&links, &substituted));
+        let mut owned = self.link_springs(&links, &substituted.spans);
         owned.extend(self.gear_springs(&gears, &model));
         let mounting = mounted.as_ref().map(|_| substituted.spans.len() - 1);
         owned.extend(mounted.into_iter().flatten());
@@ -139,40 +143,25 @@ impl Robot {
         Ok(Some(owned.collect()))
     }
 
-    /// Returns the springs of the lumped links.
-    fn lumped_springs(&self, substituted: &Substituted) -> Vec<OwnedSpring> {
-        let springs = &substituted.springs;
+    /// Returns the springs of the flexible links, one per elastic joint of a lumped link and one per
+    /// modal link. `links` and `spans` are in the order of the robot's flexible links.
+    fn link_springs(&self, links: &[FlexibleLink], spans: &[FlexibleSpan]) -> Vec<OwnedSpring> {
         let mut owned = Vec::new();
-        for (k, span) in substituted.spans.iter().enumerate() {
-            let of_link: Vec<_> = springs.iter().filter(|spring| spring.link == span.link).collect();
-            for (number, spring) in of_link.iter().enumerate() {
-                let name = match of_link.len() {
-                    1 => span.link.clone(),
-                    _ => format!("{}.{}", span.link, number + 1),
-                };
-                let (group, damping) = (spring.joint.clone(), self.flexible_links[k].damping);
-                owned.push(OwnedSpring {
-                    group,
-                    spring: Spring::from((name, self.flexible_links[k].scaled(&spring.K_S), damping)),
-                    owner: Owner::Link(k),
-                });
+        for (k, ((source, link), span)) in self.flexible_links.iter().zip(links).zip(spans).enumerate() {
+            let (name, owner) = (&link.link, Owner::Link(k));
+            if let LinkForm::Modal(modal) = &link.form {
+                let geometric = modal.geometric.as_ref().filter(|_| source.choices.geometric);
+                let geometric = geometric.map(|g| Arc::new(stiffening(g, span.share)));
+                let K = &modal.K * source.stiffness_factor;
+                let spring = Spring { geometric, ..Spring::linear(name, K, source.damping) };
+                owned.push(OwnedSpring { group: name.clone(), spring, owner });
             }
-        }
-        owned
-    }
-
-    /// Returns the springs of the modal links.
-    fn modal_springs(&self, links: &[FlexibleLink], substituted: &Substituted) -> Vec<OwnedSpring> {
-        let mut owned = Vec::new();
-        for link in links {
-            let span = substituted.spans.iter().position(|span| span.link == link.link);
-            let (LinkForm::Modal(modal), Some(k)) = (&link.form, span) else { continue };
-            let source = &self.flexible_links[k];
-            let geometric = modal.geometric.as_ref().filter(|_| source.choices.geometric);
-            let geometric = geometric.map(|g| Arc::new(stiffening(g, substituted.spans[k].share)));
-            let K = &modal.K * source.stiffness_factor;
-            let spring = Spring { geometric, ..Spring::linear(&link.link, K, source.damping) };
-            owned.push(OwnedSpring { group: link.link.clone(), spring, owner: Owner::Link(k) });
+            for (number, joint) in span.joints.iter().enumerate() {
+                let several = span.joints.len() > 1;
+                let name = if several { format!("{name}.{}", number + 1) } else { name.clone() };
+                let spring = Spring::from((name, source.scaled(&joint.K_S), source.damping));
+                owned.push(OwnedSpring { group: joint.joint.clone(), spring, owner });
+            }
         }
         owned
     }

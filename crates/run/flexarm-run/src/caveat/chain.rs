@@ -5,6 +5,7 @@ use flexarm_kinematics::{Joint, Mechanism};
 use super::size::Size;
 use super::{Finding, FindingKind, kinds};
 use crate::robot::drive_entry::{Drive, DriveKind};
+use crate::robot::entry_checks::carrier;
 use crate::robot::{PAYLOAD_LINK, Robot};
 
 /// Joint range that separates fingers (less) from arm joints (more) (rad).
@@ -50,16 +51,6 @@ fn moving(robot: &Robot) -> Vec<String> {
     let held = |name: &str| robot.hold.iter().any(|(held, _)| held == name);
     let moves = model.coordinates().iter().filter(|c| c.limits.upper > c.limits.lower && !held(&c.joint));
     moves.map(|c| c.joint.clone()).collect()
-}
-
-/// Returns the link of the same rigid body that is nearest to the base.
-fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
-    let parent = |link: &str| mechanism.joints.iter().find(|joint| joint.child == link);
-    let mut body = link;
-    while let Some(joint) = parent(body).filter(|joint| joint.kind.degrees_of_freedom() == 0) {
-        body = &joint.parent;
-    }
-    body
 }
 
 /// Part of the robot beyond a body, seen from the base.

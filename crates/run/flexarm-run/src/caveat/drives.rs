@@ -74,7 +74,7 @@ pub(crate) fn of_drives(drives: &[Drive], mechanism: &Mechanism, rigid: &Model) 
     let armature = |joint: &str| drives.iter().find(|d| d.joint == joint).map_or(0.0, |d| d.armature);
     let heaviest = heaviest.map(|(inertia, c)| inertia - armature(&c.joint)).fold(0.0, f64::max);
     for drive in drives {
-        let joint = mechanism.joints.iter().find(|j| j.name == drive.joint);
+        let joint = mechanism.joint(&drive.joint);
         let slides = joint.is_some_and(|j| j.kind.slides());
         let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
         let speed = joint.map_or(f64::INFINITY, |j| j.limits.velocity);
@@ -126,7 +126,7 @@ fn relaxations(gear: &GearDamping, stiffness: &GearStiffness, least: f64) -> Vec
 /// a weak gear, or with fewer than two others.
 fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option<f64> {
     let turns = |drive: &Drive| {
-        let joint = mechanism.joints.iter().find(|j| j.name == drive.joint && !j.kind.slides())?;
+        let joint = mechanism.joint(&drive.joint).filter(|j| !j.kind.slides())?;
         let effort = joint.limits.effort;
         (effort.is_finite() && effort > STRONG).then_some(effort / stiffness(drive)?.0)
     };

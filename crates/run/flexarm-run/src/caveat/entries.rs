@@ -108,7 +108,7 @@ fn of_guides(robot: &Robot) -> Vec<Finding> {
         for (what, end) in [("outer_end", tubes.outer_end), ("inner_end", tubes.inner_end)] {
             caveats.extend(outside(&kinds::GUIDE_END, name(what), end, &(-far..=far), slip::LENGTH, 1.0));
         }
-        let Some(joint) = robot.rigid.joints.iter().find(|joint| joint.name == drive.joint) else { continue };
+        let Some(joint) = robot.rigid.joint(&drive.joint) else { continue };
         let tilts = drive.gearbox.iter().flat_map(|(_, damping)| &damping.tilts);
         for tilt in tilts {
             let name = |what: &str| name(&format!("{}.{what}", tilt.axis));

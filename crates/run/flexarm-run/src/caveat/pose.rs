@@ -45,7 +45,7 @@ impl ArmAtRest<'_> {
         for (element, owner) in self.plant.elements.iter().zip(&self.arm.owners) {
             let Owner::Drive(k) = owner else { continue };
             let drive = &self.arm.robot().drives[*k];
-            let joint = self.arm.robot().rigid.joints.iter().find(|j| j.name == drive.joint);
+            let joint = self.arm.robot().rigid.joint(&drive.joint);
             let effort = joint.map_or(f64::INFINITY, |j| j.limits.effort);
             let e = &self.elastic[self.plant.offset(element)..][..element.size];
             let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();

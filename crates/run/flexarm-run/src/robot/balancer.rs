@@ -1,18 +1,23 @@
 //! Balancers: springs, gas springs and counterbalances of a robot, and the poses in which they can
 //! act.
+//!
+//! A balancer between two points acts along their line, one over a joint on its value (rad or m).
+//! Tension is positive where it pulls the ends together or the joint to lower values. Start at
+//! [`Robot::with_balancer`]. Not here: the entries of a robot file (`balancer_entry`), the force
+//! laws and their place in the recursions (`flexarm-kinematics`).
 
 use flexarm_kinematics::{
-    Balancer, BalancerLaw, BalancerPlace, BalancerSpan, Data, Frame, Joint, JointKind, Link, Mechanism, Model,
-    PlacedBalancer, Pose, forward_kinematics, frame_jacobian,
+    Balancer, BalancerLaw, BalancerPlace, BalancerSpan, Data, Frame, Joint, Model, PlacedBalancer, Pose,
+    forward_kinematics, frame_jacobian,
 };
 use flexarm_settings::known_names;
 use flexarm_trajectory::Trajectory;
-use nalgebra::{DVector, Matrix6xX, Rotation3, Vector3};
+use nalgebra::{DVector, Matrix6xX, Rotation3};
 use serde::Serialize;
 
 use crate::error::Error;
 use crate::robot::Robot;
-use crate::robot::entry_checks::loop_of_joint;
+use crate::robot::entry_checks::{add_point, carrier, check_point, loop_of_joint};
 
 /// A balancer to add to a robot ([`Robot::with_balancer`]).
 #[derive(Clone, Debug, PartialEq)]
@@ -79,84 +84,56 @@ impl Robot {
 
     pub(crate) fn add_balancer(&mut self, balancer: RobotBalancer) -> Result<(), Error> {
         let RobotBalancer { name, ends, law } = balancer;
+        let fail = |what: String| Error::Modelling(format!("balancer {name:?}{what}"));
         if self.rigid.balancers.iter().any(|other| other.name == name) {
-            return Err(Error::Modelling(format!("balancer {name:?} is defined twice: names must be unique")));
+            return Err(fail(" is defined twice: names must be unique".into()));
         }
         let span = match ends {
             BalancerEnds::Joint(joint) => {
                 let moves = |j: &&Joint| j.kind.axis_motion().is_some() && !j.kind.is_elastic();
-                let Some(found) = self.rigid.joints.iter().filter(moves).find(|j| j.name == joint) else {
+                let Some(found) = self.rigid.joint(&joint).filter(moves) else {
                     let known: Vec<_> = self.rigid.joints.iter().filter(moves).map(|j| j.name.clone()).collect();
-                    return Err(Error::Modelling(format!(
-                        "balancer {name:?}: the robot has no movable joint {joint:?}; it has {}",
-                        known_names(&joint, &known)
-                    )));
+                    let known = known_names(&joint, &known);
+                    return Err(fail(format!(": the robot has no movable joint {joint:?}; it has {known}")));
                 };
                 if let Some(own) = loop_of_joint(&self.rigid, &joint) {
-                    return Err(Error::Modelling(format!(
-                        "balancer {name:?}: joint {joint:?} follows from a loop, {own:?}: give its two ends, from \
-                         and to, instead"
-                    )));
+                    let remedy = "give its two ends, from and to, instead";
+                    return Err(fail(format!(": joint {joint:?} follows from a loop, {own:?}: {remedy}")));
                 }
                 if matches!(law, BalancerLaw::Sine { .. }) && found.kind.slides() {
-                    return Err(Error::Modelling(format!(
-                        "balancer {name:?}: a sine is a torque over an angle, but joint {joint:?} slides: use spring \
-                         or curve"
-                    )));
+                    let what = format!(": a sine is a torque over an angle, but joint {joint:?} slides");
+                    return Err(fail(what + ": use spring or curve"));
                 }
                 BalancerSpan::Joint { joint, child: found.child.clone() }
             }
-            BalancerEnds::Points(ends) => self.line(&name, &ends)?,
+            BalancerEnds::Points(ends) => {
+                let frames = self.line(&name, &ends).map_err(|what| fail(format!(": {what}")))?;
+                let [from, to] = frames;
+                BalancerSpan::Points { from, to }
+            }
         };
         self.rigid.balancers.push(Balancer { name, span, law });
         Ok(())
     }
 
-    /// Adds frames for the two ends. They are fixed to their links, so that on a flexible link each
-    /// moves with the part it is on.
-    fn line(&mut self, name: &str, ends: &[(String, [f64; 3]); 2]) -> Result<BalancerSpan, Error> {
-        let name = name.to_owned();
+    /// Adds frames for the two ends of a line; returns their names.
+    fn line(&mut self, name: &str, ends: &[(String, [f64; 3]); 2]) -> Result<[String; 2], String> {
         for (link, p) in ends {
-            if self.rigid.link(link).is_none() {
-                let known: Vec<_> =
-                    self.rigid.links.iter().map(|l| l.name.clone()).filter(|l| !l.starts_with("__")).collect();
-                return Err(Error::Modelling(format!(
-                    "balancer {name:?}: {link:?} is not a link of the robot; its links are {}",
-                    known_names(link, &known)
-                )));
-            }
-            if let Some(value) = p.iter().find(|x| !x.is_finite()) {
-                return Err(Error::Modelling(format!(
-                    "balancer {name:?}: its point on link {link:?} has the entry {value}, expected finite numbers in \
-                     m"
-                )));
-            }
+            check_point(&self.rigid, link, p)?;
         }
-        let [first, second] = [0, 1].map(|k| ends[k].0.clone());
-        if carrier(&self.rigid, &first) == carrier(&self.rigid, &second) {
-            return Err(Error::Modelling(format!(
-                "balancer {name:?}: no joint moves link {second:?} against link {first:?}, so it does nothing: put \
-                 its ends on links with a joint between them"
-            )));
+        let [(first, _), (second, _)] = ends;
+        if carrier(&self.rigid, first) == carrier(&self.rigid, second) {
+            return Err(format!(
+                "no joint moves link {second:?} against link {first:?}, so it does nothing: put its ends on links \
+                 with a joint between them"
+            ));
         }
         let frames = ["from", "to"].map(|end| format!("__balancer_{name}_{end}"));
         for ((link, p), frame) in ends.iter().zip(&frames) {
-            let X = Pose::from_parts(Vector3::from(*p).into(), Rotation3::identity());
-            self.rigid.joints.push(Joint::new(format!("{frame}_joint"), JointKind::Fixed, link, frame, X));
-            self.rigid.links.push(Link { name: frame.clone(), inertia: None });
+            add_point(&mut self.rigid, link, *p, frame);
         }
-        let [from, to] = frames;
-        Ok(BalancerSpan::Points { from, to })
+        Ok(frames)
     }
-}
-
-/// Returns the link at the inner end of the chain of fixed joints that carries a link.
-fn carrier<'m>(mechanism: &'m Mechanism, link: &'m str) -> &'m str {
-    let mut at = link;
-    while let Some(joint) = mechanism.joints.iter().find(|j| j.child == at && j.kind == JointKind::Fixed) {
-        at = &joint.parent;
-    }
-    at
 }
 
 /// Returns the balancers of the rigid robot at joint values (rad or m).
@@ -177,8 +154,12 @@ pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<BalancerInfo> {
     model.balancers().iter().map(info).collect()
 }
 
-/// Generalised force of a balancer on each coordinate (N m or N), for the poses in `data` and its
-/// length there.
+/// Returns the generalised force of a balancer on each coordinate (N m or N), for the poses in `data`
+/// and its length there.
+///
+/// ```text
+/// τ = -T ∂l/∂q over a joint,    τ = Σ J_WEᵀ F_E_W over the two ends E of a line
+/// ```
 fn torques(model: &Model, data: &Data, balancer: &PlacedBalancer, length: f64) -> Vec<f64> {
     let mut torque = vec![0.0; model.nv()];
     match &balancer.place {
@@ -188,12 +169,12 @@ fn torques(model: &Model, data: &Data, balancer: &PlacedBalancer, length: f64) -
         BalancerPlace::Points(_) => {
             let Some(line) = balancer.line(&data.X_WB) else { return torque };
             let mut J = Matrix6xX::zeros(model.nv());
-            for (end, F_W) in [line.F_W, -line.F_W].into_iter().enumerate() {
+            for (end, f_E_W) in [line.F_W, -line.F_W].into_iter().enumerate() {
                 let X_BF = Pose::from_parts(line.p_B[end].into(), Rotation3::identity());
                 let frame = Frame { name: String::new(), body: line.bodies[end], X_BF };
                 frame_jacobian(model, data, &frame, &mut J);
                 for (k, column) in J.column_iter().enumerate() {
-                    torque[k] += column.fixed_rows::<3>(0).dot(&F_W);
+                    torque[k] += column.fixed_rows::<3>(0).dot(&f_E_W);
                 }
             }
         }

@@ -66,10 +66,7 @@ fn axis(
     let fail = |span: Range<usize>, message: String| {
         source.error(span, format!("controller axis of joint {name:?}: {message}"))
     };
-    let free = |name: &str| {
-        let joint = mechanism.joints.iter().find(|j| j.name == name);
-        joint.is_some_and(|j| j.kind != JointKind::Fixed && j.mimic.is_none())
-    };
+    let free = |name: &str| mechanism.joint(name).is_some_and(|j| j.kind != JointKind::Fixed && j.mimic.is_none());
     let unknown = |name: &String, span| {
         let names: Vec<&str> = mechanism.joints.iter().map(|j| j.name.as_str()).filter(|name| free(name)).collect();
         let known = known_names(name, &names);
@@ -135,7 +132,7 @@ fn finite(value: &Spanned<f64>, what: &str, fail: Fail<'_>) -> Result<f64, Robot
 /// Whether one joint carries another.
 fn is_above(mechanism: &Mechanism, above: &str, joint: &str) -> bool {
     let joint_above = |link: &str| mechanism.joints.iter().find(|j| j.child == link);
-    let mut at = mechanism.joints.iter().find(|j| j.name == joint).and_then(|j| joint_above(&j.parent));
+    let mut at = mechanism.joint(joint).and_then(|j| joint_above(&j.parent));
     for _ in 0..mechanism.joints.len() {
         match at {
             Some(found) if found.name == above => return true,

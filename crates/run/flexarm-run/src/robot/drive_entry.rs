@@ -1,5 +1,9 @@
 //! Drive entries of a robot file: kinds, rotors, friction and servos, from the text to checked
-//! values. Their gearboxes are in `gearbox_entry`.
+//! values.
+//!
+//! Quantities are on the joint's side of the gear (N m, rad; N, m for joints that slide). Start at
+//! [`drives`]; a [`Drive`] then serves models and caveats. Not here: gearboxes (`gearbox_entry`),
+//! default gains (`arm::servo_gains`).
 
 use std::ops::Range;
 
@@ -108,9 +112,10 @@ pub struct Drive {
     /// Kind of actuation.
     pub kind: DriveKind,
     /// Turns of the motor per turn of the joint.
-    pub(crate) ratio: f64,
-    /// Rotor inertia reflected to the joint (kg m²).
-    pub(crate) armature: f64,
+    pub ratio: f64,
+    /// Rotor inertia reflected to the joint (kg m²). Models take it from the joint in
+    /// [`crate::Robot::rigid`], which has it too.
+    pub armature: f64,
     /// Spring of the gearbox, with its damping and curve.
     pub gearbox: Option<(Gearbox, GearDamping)>,
     /// Friction.
@@ -124,17 +129,6 @@ pub struct Drive {
 }
 
 impl Drive {
-    /// Returns the turns of the motor per turn of the joint.
-    pub fn ratio(&self) -> f64 {
-        self.ratio
-    }
-
-    /// Returns the rotor inertia reflected to the joint (kg m²). Models take it from the joint in
-    /// [`crate::Robot::rigid`], which has it too.
-    pub fn armature(&self) -> f64 {
-        self.armature
-    }
-
     /// Returns the largest play to each side of the gearbox's rotations (rad) and translations (m);
     /// `slides`: whether its only spring is a translation. The curves of the springs include it.
     pub fn play(&self, slides: bool) -> [f64; 2] {
@@ -147,9 +141,7 @@ impl Drive {
         let largest = |play: &[f64]| play.iter().copied().fold(0.0, f64::max);
         [largest(&springs.play[translations..]), largest(&springs.play[..translations])]
     }
-}
 
-impl Drive {
     /// Returns the kind of actuation under this drive model.
     pub(crate) fn kind_as(&self, drives: DriveModel) -> DriveKind {
         match drives {
@@ -236,6 +228,7 @@ fn drive(
 ) -> Result<Drive, RobotFileError> {
     let name = entry.joint.get_ref();
     let fail = |span: Range<usize>, message: String| source.error(span, format!("drive of joint {name:?}: {message}"));
+    // Joint and kind of actuation, and whether they go together.
     let joint = joint_of(entry, mechanism, &fail)?;
     let kind = kind_of(entry, source)?;
     check_joint(entry, joint, kind, mechanism, &fail)?;
@@ -244,16 +237,16 @@ fn drive(
         Some(v) if v.get_ref().is_finite() && *v.get_ref() >= lowest => Ok(*v.get_ref()),
         Some(v) => Err(fail(v.span(), format!("{what} is {}, expected a number of at least {lowest}", v.get_ref()))),
     };
+    // Rotor: its inertia counts ratio² times at the joint.
     let ratio = number(&entry.ratio, "ratio", 1.0, f64::MIN)?;
     if ratio == 0.0 {
         let span = entry.ratio.as_ref().map_or(0..0, Spanned::span);
         return Err(fail(span, "ratio is 0, expected the motor's turns per turn of the joint".into()));
     }
     let armature = ratio * ratio * number(&entry.motor_inertia, "motor_inertia", 0.0, 0.0)?;
-    let gearbox = match &entry.gearbox {
-        Some(gearbox) => Some(gear(joint, gearbox, entry.ratio.as_ref().map(|_| ratio), &fail)?),
-        None => None,
-    };
+    // Spring, without which a gearbox drive is none, and which a prescribed one does not use.
+    let own_ratio = entry.ratio.as_ref().map(|_| ratio);
+    let gearbox = entry.gearbox.as_ref().map(|gearbox| gear(joint, gearbox, own_ratio, &fail)).transpose()?;
     match (kind, &gearbox) {
         (DriveKind::Gearbox, None) => {
             let text = "kind = \"gearbox\" needs gearbox = { stiffness = ..., damping = ... }";
@@ -269,15 +262,13 @@ fn drive(
         }
         _ => {}
     }
+    // Friction and servo.
     let gear = gearbox.as_ref().map(|(gearbox, _)| gearbox);
     let (friction, load_friction) = match &entry.friction {
         None => (Friction::NONE, 0.0),
         Some(friction) => friction_of(friction, kind, gear, &fail)?,
     };
-    let servo = match &entry.servo {
-        None => ServoEntry::default(),
-        Some(servo) => checked_servo(servo, &fail)?,
-    };
+    let servo = entry.servo.as_ref().map(|servo| checked_servo(servo, &fail)).transpose()?.unwrap_or_default();
     if entry.servo.is_some() && kind != DriveKind::Torque {
         warnings.push(format!("drive of joint {name:?}: its servo is not used, only kind = \"torque\" has one"));
     }

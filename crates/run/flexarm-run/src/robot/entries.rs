@@ -1,11 +1,15 @@
 //! Entries of a robot file that change the rigid robot: joints, payload, TCP and masses of beams.
+//!
+//! Each function checks one entry and changes the tree, or reports the entry's line. Inertias are
+//! about centres of mass, in link axes. Not here: entries that stay beside the tree, such as drives
+//! and flexible links (`*_entry.rs`), and the order of all (`load.rs`).
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::Parts;
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Mechanism, Pose};
 use flexarm_settings::known_names;
 use flexarm_urdf::{UrdfRobot, default_tcp};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
 use toml::Spanned;
 
 use super::load::LoadOptions;
@@ -13,7 +17,7 @@ use super::{PAYLOAD_LINK, Robot};
 use crate::body_change::BodyChange;
 use crate::caveat::Finding;
 use crate::error::Error;
-use crate::robot::entry_checks::{check_finite, loop_of_joint, pose, unknown_link};
+use crate::robot::entry_checks::{check_finite, inertia, loop_of_joint, pose, unknown_link};
 use crate::robot::link_entry::FlexibleLinkEntry;
 use crate::robot::robot_file::{PayloadEntry, RobotFile};
 use crate::robot::robot_link::RobotLink;
@@ -78,7 +82,7 @@ impl Robot {
         let payload = entry.get_ref();
         let com = payload.com.unwrap_or_default();
         check_finite("payload com", &com, entry.span(), source)?;
-        check_finite("payload inertia", &payload.inertia, entry.span(), source)?;
+        let inertia_com = inertia("payload", &payload.inertia, entry.span(), source)?;
         let link = payload.link.as_ref().map_or_else(|| tcp_link.to_owned(), |l| l.get_ref().clone());
         if self.rigid.link(&link).is_none() {
             let span = payload.link.as_ref().map_or(0..0, Spanned::span);
@@ -98,12 +102,6 @@ impl Robot {
         if payload.com.is_none() {
             let message =
                 "payload has no com: its centre of mass in axes of the link, such as com = [0.0, 0.0, 0.1], in m";
-            return Err(source.error(entry.span(), message).into());
-        }
-        let [xx, yy, zz, xy, xz, yz] = payload.inertia;
-        let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
-            let message = "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
             return Err(source.error(entry.span(), message).into());
         }
         // The payload frame is at its centre of mass, so a cut through the link assigns the payload

@@ -1,12 +1,16 @@
 //! Gearbox of a drive: springs, dampers, play, curves and guides, from the text to checked values.
+//!
+//! Springs are on the joint's side, along and about the axes of the joint frame (N/m, N m/rad): one
+//! about the axis, three about x, y, z, or six. Start at [`gear`]. Not here: transmission error and
+//! hysteresis (`gear_entry`), tubes of telescopic joints (`guide_entry`).
 
 use std::ops::Range;
 
 use flexarm_files::TextFileError as RobotFileError;
-use flexarm_flexlink::{GearStiffness, Gearbox};
-use flexarm_kinematics::Joint;
+use flexarm_flexlink::{GearStiffness, Gearbox, spring_stiffness};
+use flexarm_kinematics::{Joint, JointKind};
 use flexarm_stepping::{Damping, Harmonic, TorqueCurve};
-use nalgebra::Matrix6;
+use nalgebra::{Matrix6, Vector6};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -60,7 +64,7 @@ impl GearboxEntry {
 }
 
 /// Damping and curve of a gearbox's springs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct GearDamping {
     /// Damping per coordinate; None means 3 % modal damping.
     pub dampers: Option<Vec<f64>>,
@@ -104,6 +108,7 @@ pub(crate) fn gear(
     if let Some(guide) = &gear.guide {
         return guide_gear(joint, guide, gear, &at);
     }
+    // Springs, with their play.
     let points = points_of(gear, &at)?;
     let (stiffness, size) = stiffness_of(gear, points.as_ref(), &at)?;
     let springs = match &stiffness {
@@ -116,6 +121,7 @@ pub(crate) fn gear(
         GearStiffness::Full(K) if !play.is_empty() => GearStiffness::Separate(K.diagonal().into()),
         other => other,
     };
+    // Laws beyond stiffness and play: dampers, curves, transmission error, hysteresis.
     let dampers = dampers(gear, size, &at)?;
     if size > 1 && (gear.hysteresis.is_some() || !gear.transmission_error.is_empty()) {
         return Err(at("transmission_error and hysteresis need one stiffness, about the axis".into()));
@@ -139,7 +145,7 @@ pub(crate) fn gear(
 
 /// Returns the stiffness of the housing of a joint before its angle.
 fn seat_of(joint: &Joint, seat: &[f64; 2], size: usize, gear: &GearboxEntry) -> Result<[f64; 2], &'static str> {
-    if joint.kind == flexarm_kinematics::JointKind::Fixed {
+    if joint.kind == JointKind::Fixed {
         return Err("seat is before the angle of a moving joint; this joint is fixed: use stiffness");
     }
     if size > 3 || gear.hysteresis.is_some() || !gear.transmission_error.is_empty() {
@@ -212,25 +218,19 @@ fn stiffness_of(
         (None, Some(curve)) => (GearStiffness::Axis(curve.stiffest()), 1),
         (Some(Numbers::Many(k)), _) if k.len() == 3 => (GearStiffness::Tilting([k[0], k[1], k[2]]), 3),
         (Some(Numbers::Many(k)), _) if k.len() == 6 => {
-            (GearStiffness::Full(Matrix6::from_diagonal(&nalgebra::Vector6::from_column_slice(k))), 6)
+            (GearStiffness::Full(Matrix6::from_diagonal(&Vector6::from_column_slice(k))), 6)
         }
         (Some(Numbers::Matrix(rows)), _) if rows.len() == 6 && rows.iter().all(|r| r.len() == 6) => {
-            let K = Matrix6::from_fn(|i, j| rows[i][j]);
-            let asymmetry = (K - K.transpose()).amax() / K.amax();
-            if asymmetry > 1e-9 {
-                return Err(at(format!("the 6x6 stiffness is not symmetric: relative asymmetry {asymmetry:.1e}")));
-            }
-            (GearStiffness::Full((K + K.transpose()) * 0.5), 6)
+            (GearStiffness::Full(Matrix6::from_fn(|i, j| rows[i][j])), 6)
         }
         _ => return Err(at("stiffness takes one number, 3, 6 or a 6x6 matrix".into())),
     };
-    let values = match &stiffness {
-        GearStiffness::Full(K) if K.iter().all(|k| k.is_finite()) => K.symmetric_eigenvalues().as_slice().to_vec(),
-        GearStiffness::Full(K) => K.as_slice().to_vec(),
-        other => other.each().unwrap_or_default().to_vec(),
-    };
-    match values.into_iter().find(|k| !(k.is_finite() && *k > 0.0)) {
-        Some(found) => Err(at(format!("the stiffness must be finite and positive (definite), found {found:e}"))),
+    if let GearStiffness::Full(K) = &stiffness {
+        let K = spring_stiffness(K).map_err(|error| at(format!("stiffness: {error}")))?;
+        return Ok((GearStiffness::Full(K), size));
+    }
+    match stiffness.each().unwrap_or_default().iter().find(|k| !(k.is_finite() && **k > 0.0)) {
+        Some(found) => Err(at(format!("the stiffness must be finite and positive, found {found:e}"))),
         None => Ok((stiffness, size)),
     }
 }
@@ -255,7 +255,7 @@ fn dampers(gear: &GearboxEntry, size: usize, at: GearboxFault<'_>) -> Result<Opt
     }
 }
 
-/// Returns the guide of a telescopic joint.
+/// Reads the gearbox of a telescopic joint: the guide alone.
 fn guide_gear(
     joint: &Joint,
     guide: &GuideEntry,
@@ -270,16 +270,5 @@ fn guide_gear(
     let (tubes, tilts) = guide.checked(joint).map_err(|error| at(error.to_string()))?;
     let dampers = dampers(gear, tilts.len(), at)?;
     let gearbox = Gearbox { joint: joint.name.clone(), stiffness: GearStiffness::Guide(tubes), seat: None };
-    Ok((
-        gearbox,
-        GearDamping {
-            dampers,
-            curves: Vec::new(),
-            play: Vec::new(),
-            transmission: Vec::new(),
-            hysteresis: None,
-            tilts,
-            identified: gear.identified,
-        },
-    ))
+    Ok((gearbox, GearDamping { dampers, tilts, identified: gear.identified, ..GearDamping::default() }))
 }

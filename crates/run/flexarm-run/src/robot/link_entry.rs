@@ -1,10 +1,15 @@
 //! Flexible link entries of a robot file: from the text to reduced links with their options.
+//!
+//! A link comes from a `.flex` file or from a beam between the link's frame and its distal joint.
+//! Start at [`flexible_link`]; every fault is reported at its key. L is the link's frame, B that of
+//! the distal joint; a 6×6 is in link axes at the split, linear first. Not here: the forms of a link
+//! ([`RobotLink::form`]), sections and materials (`beam_entry`), strengths (`strength`).
 
 use std::path::{Path, PathBuf};
 
-use flexarm_fem::{BeamLink, Material, ReducedLink, Section};
+use flexarm_fem::{BeamLink, ReducedLink};
 use flexarm_files::{Source, TextFileError as RobotFileError, named_file};
-use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint};
+use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint, spring_stiffness};
 use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
 use flexarm_linkmaker::reduce::STRESS_FILE;
 use flexarm_settings::{Words, known_names};
@@ -20,12 +25,6 @@ use crate::robot::entry_checks::keep;
 use crate::robot::file_cache::FileCache;
 use crate::robot::robot_link::{LinkChoices, RequestedKey, RobotLink, StressSource};
 use crate::robot::strength::{Strength, StrengthEntry};
-
-/// Tolerance for a symmetric matrix: difference of mirrored entries, relative to the geometric mean
-/// of the diagonal entries.
-const SYMMETRIC: f64 = 1e-9;
-/// Minimum eigenvalue of a stiffness scaled to unit diagonal; below it round-off decides.
-const DEFINITE: f64 = 1e-12;
 
 /// Folder in which the files of links are searched, and the cache that reads them.
 pub(crate) struct LinkHome<'a> {
@@ -104,6 +103,7 @@ pub(crate) fn flexible_link(
     warnings: &mut Vec<String>,
     faults: &mut Vec<Error>,
 ) -> Result<RobotLink, Error> {
+    // Choices of the entry, and the joint at the far end.
     let name = entry.link.get_ref();
     let model = model_of(entry, source)?;
     let segments = count(&entry.segments, "segments", 2, source)?.unwrap_or(2);
@@ -122,6 +122,7 @@ pub(crate) fn flexible_link(
         source.error(entry.distal.as_ref().map_or(entry.link.span(), Spanned::span), e.to_string())
     })?;
 
+    // Stiffness and parts, from a file or a beam.
     let (reduced, parts, beam) = match (&entry.reduced, &entry.beam) {
         (Some(file), None) => (stored_link(name, file, source, home, warnings)?, Parts::Reduced, None),
         (None, Some(beam)) => beam_link(name, beam, distal.X_PJ, mechanism, source, warnings)?,
@@ -133,6 +134,8 @@ pub(crate) fn flexible_link(
     let distal = Some(distal.name.clone());
     let (form, coupling) = (LinkForm::TwoParts, entry.coupling);
     let flexible = FlexibleLink { link: name.clone(), distal, reduced, parts, form, angles, coupling };
+
+    // What applies to all forms of the link: factors, stress, strength.
     let geometric = entry.geometric_stiffening.as_ref().is_some_and(|asked| *asked.get_ref());
     let choices = LinkChoices { model, segments, modes, eigenmodes, geometric };
     let (stiffness_factor, stiffness_factors) = factors(entry, source)?;
@@ -288,7 +291,7 @@ fn stress_source(
     }
 }
 
-/// Reads the stiffness of a spring; it must be symmetric and positive definite.
+/// Reads the 6×6 stiffness of the spring between the two parts of a link.
 fn matrix6(
     given: &Spanned<Vec<Vec<f64>>>,
     entry: &FlexibleLinkEntry,
@@ -309,35 +312,10 @@ fn matrix6(
             "coupling = false belongs to the stiffness of a .flex file or beam: write zeros here instead".into(),
         );
     }
-    let K = Matrix6::from_fn(|i, j| rows[i][j]);
-    if let Some(i) = (0..6).find(|i| !(K[(*i, *i)].is_finite() && K[(*i, *i)] > 0.0)) {
-        return fail(format!("[{i}][{i}] is {}, expected a positive number", K[(i, i)]));
-    }
-    let size = |i: usize, j: usize| (K[(i, i)] * K[(j, j)]).sqrt();
-    let pairs = || (0..6).flat_map(|i| (i + 1..6).map(move |j| (i, j)));
-    let is_asymmetric = |(i, j): &(usize, usize)| {
-        let apart = (K[(*i, *j)] - K[(*j, *i)]).abs();
-        apart.is_nan() || apart > SYMMETRIC * size(*i, *j)
-    };
-    if let Some((i, j)) = pairs().find(is_asymmetric) {
-        let (a, b) = (K[(i, j)], K[(j, i)]);
-        return fail(format!("[{i}][{j}] is {a} and [{j}][{i}] is {b}: it must be symmetric"));
-    }
-    let unit = Matrix6::from_fn(|i, j| 0.5 * (K[(i, j)] + K[(j, i)]) / size(i, j));
-    let least = unit.symmetric_eigenvalues().min();
-    if least > DEFINITE {
-        return Ok((K + K.transpose()) * 0.5);
-    }
-    let largest = pairs().max_by(|a, b| unit[*a].abs().total_cmp(&unit[*b].abs()));
-    let (i, j) = largest.unwrap_or((0, 0));
-    fail(format!(
-        "it is not positive definite: with its diagonal scaled to one its smallest eigenvalue is {least:.3e}, expected above {DEFINITE:e}; \
-         the largest coupling is [{i}][{j}] = {}, {:.4} of the root of [{i}][{i}] [{j}][{j}]",
-        K[(i, j)],
-        unit[(i, j)].abs()
-    ))
+    spring_stiffness(&Matrix6::from_fn(|i, j| rows[i][j])).or_else(|error| fail(error.to_string()))
 }
 
+/// Reads the damping of a link or a mounting; 3 % modal damping by default.
 pub(crate) fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {
     let Some(entry) = entry else { return Ok(Damping::Modal(0.03)) };
     let (value, damping) = match entry.get_ref() {
@@ -363,6 +341,9 @@ pub(crate) fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source)
     Ok(damping)
 }
 
+/// Builds the link of a beam, with the source of the masses of its parts and the beam itself.
+///
+/// * `X_LB`: pose of the distal joint in the link, link axes (m).
 fn beam_link(
     name: &str,
     entry: &Spanned<BeamEntry>,
@@ -373,8 +354,9 @@ fn beam_link(
 ) -> Result<(ReducedLink, Parts, Option<BeamLink>), Error> {
     let beam = entry.get_ref();
     let fail = |message: String| Error::from(source.error(entry.span(), format!("link {name:?}: {message}")));
-    let (section, material): (Section, Material) = beam_section(beam).map_err(|error| fail(error.to_string()))?;
-    let theory = beam.theory().map_err(|error| fail(error.to_string()))?;
+    let (section, material) = beam_section(beam).map_err(fail)?;
+    let theory = beam.theory().map_err(fail)?;
+    // The line of the beam, from A to B or between ends of its own.
     let [from, to] = beam.ends.map_or([Vector3::zeros(), X_LB.translation.vector], |ends| ends.map(Vector3::from));
     let axis = to - from;
     let length = axis.norm();

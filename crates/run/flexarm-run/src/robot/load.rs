@@ -1,4 +1,10 @@
 //! Loading of a robot: from a robot file, its texts, or a bare URDF or xacro file.
+//!
+//! Start at [`RobotSource::load`]. Text becomes plain structs (`robot_file.rs`); the description is
+//! read with the options of the file; then the entries change the rigid robot or stay beside it, in
+//! the order of [`Robot::add_entries`]; at last links and drives are modelled once, so that a file
+//! that loads can run. Faults are collected and reported together. Not here: the URDF itself
+//! (`flexarm-urdf`), single entries (`*_entry.rs`).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -134,18 +140,24 @@ impl Robot {
         let name = urdf.mechanism.name.clone();
         let link = options.tcp.clone().or_else(|| default_tcp(&urdf.mechanism).map(str::to_owned));
         let link = link.ok_or(Error::NoTcp { in_file: false })?;
-        let robot = Self {
+        let tcp = (link, Pose::identity());
+        Self { tcp, tcp_override: options.tcp.clone(), ..Self::of_urdf(name, path, path.to_owned(), urdf) }.finish(None)
+    }
+
+    /// Returns the robot of a description, without a TCP and without what a robot file adds.
+    fn of_urdf(name: String, path: &Path, urdf_path: PathBuf, urdf: UrdfRobot) -> Self {
+        Self {
             name,
             path: path.to_owned(),
-            urdf_path: path.to_owned(),
+            urdf_path,
             rigid: urdf.mechanism.clone(),
             urdf,
             flexible_links: Vec::new(),
             mounting: None,
             drives: Vec::new(),
             coupling: None,
-            tcp: (link, Pose::identity()),
-            tcp_override: options.tcp.clone(),
+            tcp: Default::default(),
+            tcp_override: None,
             default_trajectory: None,
             hold: Vec::new(),
             warnings: Vec::new(),
@@ -153,8 +165,7 @@ impl Robot {
             calibration: Vec::new(),
             gauges: Vec::new(),
             written: Vec::new(),
-        };
-        robot.finish(None)
+        }
     }
 
     /// Builds a robot from a parsed robot file and its description.
@@ -171,25 +182,15 @@ impl Robot {
         let mut faults: Vec<Error> = Vec::new();
         let (rigid, calibration) = changed_mechanism(&mut urdf.mechanism, file, source, &mut faults);
         let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
+        let name = file.name.clone().unwrap_or_else(|| name_of_folder(folder));
         let mut robot = Self {
-            name: file.name.clone().unwrap_or_else(|| name_of_folder(folder)),
-            path: path.to_owned(),
-            urdf_path,
             rigid,
-            urdf,
-            flexible_links: Vec::new(),
-            mounting: None,
-            drives: Vec::new(),
-            coupling: None,
             tcp: tcp.unwrap_or_default(),
             tcp_override: options.tcp.clone(),
             default_trajectory: file.default_trajectory.as_ref().map(|t| folder.join(t.get_ref())),
-            hold: Vec::new(),
-            warnings: Vec::new(),
-            controller: Vec::new(),
             calibration,
-            gauges: Vec::new(),
             written: written_caveats(file, source),
+            ..Self::of_urdf(name, path, urdf_path, urdf)
         };
         robot.add_entries(file, source, &LinkHome { folder, files }, &mut faults);
         match faults.len() {
@@ -203,6 +204,7 @@ impl Robot {
     /// Adds payload, loops, drives, balancers, flexible links, gauges and mounting of the file, in
     /// an order in which each finds what it builds on.
     fn add_entries(&mut self, file: &RobotFile, source: &Source, home: &LinkHome<'_>, faults: &mut Vec<Error>) {
+        // The rigid tree: payload and loops, before entries that name their joints.
         if let Some(payload) = &file.payload {
             let link = file.tcp.as_ref().map(|t| t.get_ref().link.get_ref().as_str());
             let link = link.or_else(|| default_tcp(&self.urdf.mechanism)).unwrap_or_default().to_owned();
@@ -213,6 +215,7 @@ impl Robot {
             let held = held_joint(joint, value, &self.rigid, source).map_err(Error::from);
             self.hold.extend(keep(held, faults));
         }
+        // Drives with their rotors, which couplings distribute over several joints.
         self.drives = drives(&file.drive, &self.rigid, source, &mut self.warnings, faults);
         for drive in &self.drives {
             for joint in self.rigid.joints.iter_mut().filter(|j| j.name == drive.joint) {
@@ -225,6 +228,7 @@ impl Robot {
             self.coupling = keep(found, faults);
         }
         add_balancers(self, &file.balancer, source, faults);
+        // Flexible links, whose masses count in the rigid robot too; then what is on them.
         for entry in &file.flexible_link {
             keep(self.reweigh(entry, source).map_err(Error::from), faults);
             let urdf = &self.urdf.mechanism;

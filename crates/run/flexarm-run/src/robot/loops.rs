@@ -1,10 +1,12 @@
 //! Closed loops: the pins that close the kinematic loops of a robot, the poses in which they close,
 //! and their transmission angles.
+//!
+//! Two joints of each loop depend on the others. The transmission angle is that between the two bars
+//! at the pin, at most π/2; at zero, the dead point, the loop could continue in two ways. Start at
+//! [`Robot::with_loops`] and [`along_motion`]. Not here: the entries of a robot file (`loop_entry`),
+//! the solution of a loop at a pose (`flexarm-kinematics`).
 
-use flexarm_kinematics::{
-    Data, Joint, JointKind, Link, LoopClosure, Mechanism, Model, ModelError, Pose, forward_kinematics,
-};
-use flexarm_settings::known_names;
+use flexarm_kinematics::{Data, LoopClosure, Mechanism, Model, ModelError, PlacedLoop, forward_kinematics};
 use flexarm_trajectory::Trajectory;
 use nalgebra::{DVector, Rotation3, Unit, Vector3};
 use serde::Serialize;
@@ -12,7 +14,7 @@ use serde::Serialize;
 use crate::caveat::size::spread_poses;
 use crate::error::Error;
 use crate::robot::Robot;
-use crate::robot::entry_checks::loop_of_joint;
+use crate::robot::entry_checks::{add_point, check_point, loop_of_joint};
 
 /// A loop to add to a robot ([`Robot::with_loops`]): a pin on one link passes through an eye on
 /// another.
@@ -84,25 +86,14 @@ impl Robot {
         Ok(self)
     }
 
-    /// Adds a loop. The frames of pin and eye are fixed to their links, so that on a flexible link
-    /// each moves with the part it is on.
+    /// Adds a loop, with frames for its pin and its eye.
     pub(crate) fn add_loop(&mut self, own: RobotLoop) -> Result<(), Error> {
         let RobotLoop { name, pin, axis, eye, dependent, at } = own;
         if self.rigid.loops.iter().any(|other| other.name == name) {
             return Err(Error::Loop { name, what: "it is defined twice: names must be unique".into() });
         }
-        for (link, place) in [&pin, &eye] {
-            if self.rigid.link(link).is_none() {
-                let links = self.rigid.links.iter().map(|l| l.name.clone());
-                let known: Vec<String> = links.filter(|l| !l.starts_with("__")).collect();
-                let known = known_names(link, &known);
-                let what = format!("{link:?} is not a link of the robot; its links are {known}");
-                return Err(Error::Loop { name, what });
-            }
-            if let Some(value) = place.iter().find(|x| !x.is_finite()) {
-                let what = format!("its point on link {link:?} has the entry {value}, expected finite numbers");
-                return Err(Error::Loop { name, what });
-            }
+        for (link, p) in [&pin, &eye] {
+            check_point(&self.rigid, link, p).map_err(|what| Error::Loop { name: name.clone(), what })?;
         }
         let axis = match axis {
             None => axis_of_joint(&self.rigid, &pin.0, &dependent).ok_or_else(|| Error::Loop {
@@ -120,10 +111,8 @@ impl Robot {
                 })?,
         };
         let frames = ["pin", "eye"].map(|end| format!("__loop_{name}_{end}"));
-        for ((link, place), frame) in [pin, eye].into_iter().zip(&frames) {
-            let X = Pose::from_parts(Vector3::from(place).into(), Rotation3::identity());
-            self.rigid.joints.push(Joint::new(format!("{frame}_joint"), JointKind::Fixed, link, frame, X));
-            self.rigid.links.push(Link { name: frame.clone(), inertia: None });
+        for ((link, p), frame) in [pin, eye].iter().zip(&frames) {
+            add_point(&mut self.rigid, link, *p, frame);
         }
         let [pin, eye] = frames;
         self.rigid.loops.push(LoopClosure { name, pin, axis, eye, dependent, at });
@@ -139,22 +128,24 @@ impl Robot {
     }
 }
 
-/// Axis of the first revolute one of the joints, in the axes of a link, with all joints at zero.
+/// Returns the axis of the first revolute one of the joints, in the axes of link L, with all joints
+/// at zero.
 fn axis_of_joint(mechanism: &Mechanism, link: &str, joints: &[String; 2]) -> Option<Unit<Vector3<f64>>> {
     let turning = joints.iter().filter_map(|name| mechanism.joint(name)).find(|joint| joint.kind.turns())?;
-    let axis = turning.kind.axis_motion()?.axis();
-    let at = rotation_at_zero(mechanism, &turning.child)?;
-    let link = rotation_at_zero(mechanism, link)?;
-    Unit::try_new(link.inverse() * (at * axis), 1e-9)
+    let axis_J = turning.kind.axis_motion()?.axis();
+    let R_WJ = rotation_at_zero(mechanism, &turning.child)?;
+    let R_WL = rotation_at_zero(mechanism, link)?;
+    Unit::try_new(R_WL.inverse() * (R_WJ * axis_J), 1e-9)
 }
 
-/// Orientation of a link with all joints at zero; None if the joints do not form a tree.
+/// Returns the orientation `R_WL` of a link with all joints at zero; `None` if the joints do not form
+/// a tree.
 fn rotation_at_zero(mechanism: &Mechanism, link: &str) -> Option<Rotation3<f64>> {
-    let (mut at, mut R) = (link, Rotation3::identity());
+    let (mut body, mut R_BL) = (link, Rotation3::identity());
     for _ in 0..=mechanism.joints.len() {
-        match mechanism.joints.iter().find(|joint| joint.child == at) {
-            Some(joint) => (at, R) = (&joint.parent, joint.X_PJ.rotation * R),
-            None => return Some(R),
+        match mechanism.joints.iter().find(|joint| joint.child == body) {
+            Some(joint) => (body, R_BL) = (&joint.parent, joint.X_PJ.rotation * R_BL),
+            None => return Some(R_BL),
         }
     }
     None
@@ -177,7 +168,7 @@ pub(crate) fn at_pose(model: &Model, q: &DVector<f64>) -> Vec<LoopInfo> {
         let (lower, upper) = (finite(c.limits.lower), finite(c.limits.upper));
         DependentInfo { name: c.joint.clone(), kind: c.kind, lower, upper, q: data.dependent_values()[k] }
     };
-    let info = |(k, own): (usize, &flexarm_kinematics::PlacedLoop)| LoopInfo {
+    let info = |(k, own): (usize, &PlacedLoop)| LoopInfo {
         name: own.name.clone(),
         dependent: vec![joint(2 * k), joint(2 * k + 1)],
         transmission_angle: data.transmission_angles()[k],

@@ -1,5 +1,10 @@
 //! A loaded robot: URDF, payload, tool centre point and flexible links, from which models are
 //! built.
+//!
+//! Start at [`Robot::load`]. Every `[[entry]]` of a robot file has a file `*_entry.rs` here with its
+//! keys, its checks and its units; the order in which entries are applied is in `load.rs`. Inside,
+//! everything is SI; link axes are those of the URDF.
+//! Not here: models with elastic coordinates ([`crate::Arm`]), unusual values ([`crate::caveat`]).
 
 pub mod balancer;
 pub(crate) mod balancer_entry;
@@ -41,6 +46,7 @@ use crate::error::Error;
 use crate::robot::calibration_entry::Calibration;
 use crate::robot::controller_entry::RobotAxis;
 use crate::robot::drive_entry::Drive;
+use crate::robot::entry_checks::link_names;
 use crate::robot::gauge_entry::Gauge;
 use crate::robot::gear_entry::RobotCoupling;
 use crate::robot::mounting::RobotMounting;
@@ -73,8 +79,8 @@ pub struct Robot {
     pub mounting: Option<RobotMounting>,
     /// Drives given in the robot file; all other joints are prescribed.
     pub drives: Vec<Drive>,
-    /// Motors that move several joints.
-    pub(crate) coupling: Option<RobotCoupling>,
+    /// Coupling of motors that move several joints; their rotors are in [`Self::rigid`].
+    pub coupling: Option<RobotCoupling>,
     /// Link that carries the TCP, and the pose of the TCP in that link.
     pub tcp: (String, Pose),
     /// Link requested as TCP instead of the one in the file.
@@ -102,10 +108,9 @@ impl Robot {
         (&self.tcp.0, &self.tcp.1)
     }
 
-    /// Mass of the payload at the start of a run (kg), 0 without one.
+    /// Returns the mass of the payload at the start of a run (kg), 0 without one.
     pub fn payload_kg(&self) -> f64 {
-        let payload = self.rigid.links.iter().find(|link| link.name == PAYLOAD_LINK);
-        payload.and_then(|link| link.inertia.as_ref()).map_or(0.0, |inertia| inertia.mass)
+        self.rigid.link(PAYLOAD_LINK).and_then(|link| link.inertia).map_or(0.0, |inertia| inertia.mass)
     }
 
     /// Replaces the tool centre point; the payload stays where it is. Arms built from the robot
@@ -117,9 +122,8 @@ impl Robot {
     /// [`Error::UnknownTcp`] if the robot has no such link, [`Error::Value`] if the pose is not
     /// finite.
     pub fn with_tcp(mut self, link: &str, X_LT: Pose) -> Result<Self, Error> {
-        let known = || self.rigid.links.iter().map(|l| l.name.clone()).filter(|name| !name.starts_with("__")).collect();
         if link.starts_with("__") || self.rigid.link(link).is_none() {
-            return Err(Error::UnknownTcp { link: link.to_owned(), known: known() });
+            return Err(Error::UnknownTcp { link: link.to_owned(), known: link_names(&self.rigid) });
         }
         let place = X_LT.translation.vector;
         if let Some(found) = place.iter().chain(X_LT.rotation.matrix().iter()).find(|x| !x.is_finite()) {
@@ -133,11 +137,6 @@ impl Robot {
         Ok(self)
     }
 
-    /// Returns the elastic mounting of the base, if there is one.
-    pub fn mounting(&self) -> Option<&RobotMounting> {
-        self.mounting.as_ref()
-    }
-
     /// Whether the base has an elastic mounting.
     pub fn is_mounted(&self) -> bool {
         self.mounting.is_some()
@@ -146,12 +145,6 @@ impl Robot {
     /// Whether the elastic mounting has this name.
     pub fn stands_on(&self, name: &str) -> bool {
         self.mounting.as_ref().is_some_and(|mounting| mounting.name() == name)
-    }
-
-    /// Returns the coupling of motors that move several joints; their rotors are in
-    /// [`Self::rigid`].
-    pub fn coupling(&self) -> Option<&RobotCoupling> {
-        self.coupling.as_ref()
     }
 
     /// Converts joint torques to the torques of the motors that move several joints, after their
@@ -163,6 +156,7 @@ impl Robot {
 
     /// Returns the caveats that are known before any computation.
     pub fn caveats(&self) -> Vec<Finding> {
+        // What loading found, in the file's own order: entries, URDF, text.
         let file = self.path.display().to_string();
         let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == finding_text(w));
         let own = self.warnings.iter().filter(|text| !of_urdf(text));
@@ -170,6 +164,7 @@ impl Robot {
         let urdf =
             self.urdf.warnings_only().map(|w| Finding { message: finding_text(w), of_description: true, ..w.clone() });
         let mut caveats: Vec<Finding> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
+        // What the numbers themselves show: parts, links, mounting, drives, balancers, loops.
         caveats.extend(caveat::parts::of_robot(self));
         let inertia = |link: &RobotLink| self.urdf.mechanism.link(&link.flexible.link).and_then(|own| own.inertia);
         caveats

@@ -1,18 +1,24 @@
 //! Mounting entry of a robot file: from the text to springs, or to a flexible link under the base.
+//!
+//! Springs stay beside the rigid robot until it is modelled; a beam or a mesh becomes a link of the
+//! tree between the ground and the base, whose frame stays that of the world. B is the base, L the
+//! link under it, S the frame of the springs. Start at [`add_mounting`]. Not here: insertion of the
+//! springs in the tree (`flexarm_flexlink::insert_mounting`).
 
+use std::ops::Range;
 use std::path::PathBuf;
 
 use flexarm_files::{Source, TextFileError as RobotFileError, named_file};
-use flexarm_flexlink::{Mounting, base_link};
+use flexarm_flexlink::{Mounting, base_link, spring_stiffness};
 use flexarm_kinematics::{Joint, JointKind, Link, LinkInertia, Pose};
-use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
+use nalgebra::{Matrix6, Vector3, Vector6};
 use serde::Deserialize;
 use toml::Spanned;
 
 use crate::error::Error;
 use crate::robot::Robot;
 use crate::robot::beam_entry::BeamEntry;
-use crate::robot::entry_checks::{check_finite, keep, pose};
+use crate::robot::entry_checks::{check_finite, inertia, keep, pose};
 use crate::robot::gearbox_entry::{Numbers, play_of, uncoupled};
 use crate::robot::link_entry::{DampingEntry, FlexibleLinkEntry, LinkHome, damping_of, flexible_link};
 use crate::robot::mounting::RobotMounting;
@@ -72,6 +78,7 @@ fn mounting(
     home: &LinkHome<'_>,
     faults: &mut Vec<Error>,
 ) -> Result<RobotMounting, Error> {
+    // Name and place.
     let given = entry.get_ref();
     let name = given.name.as_ref().map_or("mounting", |name| name.get_ref().as_str()).to_owned();
     let name_span = given.name.as_ref().map_or(entry.span(), Spanned::span);
@@ -90,6 +97,7 @@ fn mounting(
         Ok::<_, RobotFileError>(*value.get_ref())
     });
     let (xyz, rpy) = (xyz?, rpy?);
+    // Springs, or a flexible link of a beam or a mesh.
     match (&given.stiffness, &given.beam, &given.reduced) {
         (Some(stiffness), None, None) => {
             let K_S = stiffness6(stiffness, source)?;
@@ -118,7 +126,7 @@ fn mounting(
 }
 
 /// Returns the first given key that only a flexible link has.
-fn link_keys(given: &MountingEntry) -> Option<(&'static str, std::ops::Range<usize>)> {
+fn link_keys(given: &MountingEntry) -> Option<(&'static str, Range<usize>)> {
     let model = given.model.as_ref().map(|key| ("model", key.span()));
     let segments = given.segments.as_ref().map(|key| ("segments", key.span()));
     model.or(segments).or(given.modes.as_ref().map(|key| ("modes", key.span())))
@@ -143,26 +151,7 @@ fn stiffness6(given: &Spanned<Numbers>, source: &Source) -> Result<Matrix6<f64>,
                 return Err(fail(format!("a matrix with rows of {widths:?} numbers, expected six rows of six")));
             }
         };
-    if let Some(hole) = K.iter().find(|k| !k.is_finite()) {
-        return Err(fail(format!("has the entry {hole}, expected finite numbers")));
-    }
-    let asymmetry = (K - K.transpose()).amax() / K.amax().max(f64::MIN_POSITIVE);
-    if asymmetry > 1e-9 {
-        return Err(fail(format!("the 6x6 matrix is not symmetric: relative asymmetry {asymmetry:.1e}")));
-    }
-    let K = (K + K.transpose()) * 0.5;
-    if let Some(weak) = K.diagonal().iter().find(|k| **k <= 0.0) {
-        return Err(fail(format!(
-            "has {weak} on its diagonal, expected positive numbers: make rigid directions very stiff"
-        )));
-    }
-    let scaled = Matrix6::from_fn(|i, j| K[(i, j)] / (K[(i, i)] * K[(j, j)]).sqrt());
-    match scaled.symmetric_eigenvalues().min() {
-        least if least > 1e-12 => Ok(K),
-        least => Err(fail(format!(
-            "the 6x6 matrix is not positive definite (smallest eigenvalue {least:.1e} with ones on the diagonal): some direction has no stiffness"
-        ))),
-    }
+    spring_stiffness(&K).map_err(|error| fail(error.to_string()))
 }
 
 /// Reads the mass carried by the springs in addition to the base. If the base has no mass, the
@@ -195,13 +184,7 @@ fn riding_mass(
     }
     let moments = given.inertia.unwrap_or_default();
     check_finite("mounting com", &com, entry.span(), source)?;
-    check_finite("mounting inertia", &moments, entry.span(), source)?;
-    let [xx, yy, zz, xy, xz, yz] = moments;
-    let inertia_com = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-    if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
-        let message = "mounting inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz";
-        return Err(source.error(entry.span(), message).into());
-    }
+    let inertia_com = inertia("mounting", &moments, entry.span(), source)?;
     if kg == 0.0 && moments != [0.0; 6] {
         return Err(source.error(mass.span(), "mounting: 0 kg with an inertia: give the mass that has it").into());
     }
@@ -228,7 +211,7 @@ fn base_in_link(
     entry: &Spanned<MountingEntry>,
     xyz: &[f64; 3],
     home: &LinkHome<'_>,
-    fail: &impl Fn(std::ops::Range<usize>, &str) -> Error,
+    fail: &impl Fn(Range<usize>, &str) -> Error,
 ) -> Result<Pose, Error> {
     let given = entry.get_ref();
     match (&given.reduced, &given.xyz) {
@@ -262,8 +245,7 @@ fn flexible_mounting(
     faults: &mut Vec<Error>,
 ) -> Result<RobotMounting, Error> {
     let given = entry.get_ref();
-    let fail =
-        |span: std::ops::Range<usize>, message: &str| Error::from(source.error(span, format!("mounting: {message}")));
+    let fail = |span: Range<usize>, message: &str| Error::from(source.error(span, format!("mounting: {message}")));
     if given.mass.is_some() || given.com.is_some() || given.inertia.is_some() {
         return Err(fail(
             entry.span(),

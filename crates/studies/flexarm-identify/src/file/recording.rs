@@ -164,7 +164,7 @@ impl Reader<'_> {
     /// Computes joint positions from motors that move several joints, `q = C q_m`; joint positions
     /// from the controller are left unchanged.
     fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
-        let Some(coupling) = self.cell.arm.robot().coupling() else { return Ok(()) };
+        let Some(coupling) = self.cell.arm.robot().coupling.as_ref() else { return Ok(()) };
         match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
             Some(("joints", _)) => return Ok(()),
             Some(("motors", _)) => {}
