@@ -2,21 +2,19 @@
 
 use std::path::Path;
 
+use flexarm_kinematics::Pose;
+use flexarm_run::{Error, Finding, Robot};
+use nalgebra::{DVector, Vector3};
+use serde::Serialize;
+
+use super::caveats::{caveats, combinations};
+use super::encoders::EncoderFigures;
+use super::error::refused;
+use super::file::MeasurementInput;
 use crate::estimation::{
     FittedParameter, Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, NominalArm, Parameter,
     Reading, ReadingKind, Target,
 };
-use flexarm_kinematics::Pose;
-use nalgebra::{DVector, Vector3};
-use serde::Serialize;
-
-use super::doubts::{caveats, combinations};
-use super::encoders::EncoderFigures;
-use super::error::refused;
-use super::file::MeasurementInput;
-use flexarm_run::Error;
-use flexarm_run::Finding;
-use flexarm_run::Robot;
 
 /// Maximum number of suspicious readings in the result.
 const MAX_SUSPICIOUS: usize = 10;
@@ -249,9 +247,9 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
     let mut all = Vec::new();
     for reading in &measurements.readings {
         match &reading.kind {
-            ReadingKind::Displacement { rows, .. } => all.extend(rows.iter().map(|row| match row.of.parts() {
-                (d, _, false) => (format!("{}, {}", reading.name, axis(&d)), "m"),
-                (d, _, true) => (format!("{}, about {}", reading.name, axis(&d)), "rad"),
+            ReadingKind::Displacement { rows, .. } => all.extend(rows.iter().map(|row| match row.of.rotation {
+                false => (format!("{}, {}", reading.name, axis(&row.of.direction)), "m"),
+                true => (format!("{}, about {}", reading.name, axis(&row.of.direction)), "rad"),
             })),
             ReadingKind::TargetAt { .. } => {
                 all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
@@ -316,8 +314,8 @@ fn residuals(found: &Identified, compared: &[Compared]) -> (Residual, Option<Hel
     let in_unit = |r: f64, k: usize| if one_unit { r } else { r / compared[k].std };
     let all = |residuals: &[f64]| rms(residuals.iter().enumerate().map(|(k, r)| in_unit(*r, k)));
     let held_out = found.held_out.as_ref().map(|held| {
-        let seen: Vec<usize> = (0..held.residuals.len()).filter(|k| held.residuals[*k].is_finite()).collect();
-        let of = |values: &[f64]| rms(seen.iter().map(|k| in_unit(values[*k], *k)));
+        let predicted: Vec<usize> = (0..held.residuals.len()).filter(|k| held.residuals[*k].is_finite()).collect();
+        let of = |values: &[f64]| rms(predicted.iter().map(|k| in_unit(values[*k], *k)));
         HeldOutFigures {
             folds: held.folds,
             skipped: held.skipped,
@@ -358,7 +356,7 @@ pub(super) fn answer(
         numbers: compared.len(),
         parameters: found.parameters.clone(),
         correlation: (0..p).map(|i| (0..p).map(|j| found.correlation[(i, j)]).collect()).collect(),
-        untold: found.untold.iter().map(weights).collect(),
+        untold: found.undetermined.iter().map(weights).collect(),
         combinations: combinations(found),
         residual,
         held_out,
@@ -400,7 +398,7 @@ fn shapes(
 }
 
 fn frames(input: &MeasurementInput, found: &Identified) -> Vec<FoundFrame> {
-    let all = input.instruments.iter().zip(&found.instruments).zip(&input.measurements.instruments);
+    let all = input.measurements.instrument_names.iter().zip(&found.instruments).zip(&input.measurements.instruments);
     let unknown = all.filter(|(_, given)| !matches!(given, Instrument::Known(_)));
     let frame = |((name, X_IW), _): ((&String, &Pose), _)| {
         let X_WI = X_IW.inverse();

@@ -1,14 +1,11 @@
 //! Choice of the parameters to fit, from the file of measurements or the request.
 
-use crate::estimation::{Probe, Reading, ReadingKind};
+use flexarm_run::{Arm, Error, Robot, TCP_FRAME};
 
 use super::error::{at_place, refused};
 use super::file::MeasurementInput;
 use super::parameters::{self, Candidate, ParameterLocation};
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Robot;
-use flexarm_run::TCP_FRAME;
+use crate::estimation::{Probe, Reading, ReadingKind};
 
 /// Returns the parameters that the file or the request selects, in the robot's order.
 pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Result<Vec<Candidate>, Error> {
@@ -32,7 +29,7 @@ pub(super) fn chosen(arm: &Arm, input: &MeasurementInput, fit: &[String]) -> Res
     if chosen.is_empty() {
         return Err(refused(format!("there is no parameter to fit: all of {:?} are kept", listed(&all))));
     }
-    if let Some((entry, factor)) = said_twice(&chosen) {
+    if let Some((entry, factor)) = redundant(&chosen) {
         return Err(refused(format!(
             "{entry} and {factor} describe the same stiffness: fit one of them and keep the other"
         )));
@@ -110,7 +107,7 @@ fn set_priors(chosen: &mut [Candidate], input: &MeasurementInput, all: &[Candida
 }
 
 /// Finds a fitted entry of a link's matrix together with a fitted factor on the same matrix.
-fn said_twice(chosen: &[Candidate]) -> Option<(String, String)> {
+fn redundant(chosen: &[Candidate]) -> Option<(String, String)> {
     let factor_of = |own: &str| {
         let factors = chosen.iter().filter(|c| match &c.written {
             ParameterLocation::Link { link } | ParameterLocation::LinkDirection { link, .. } => link == own,
@@ -137,12 +134,12 @@ pub(super) fn check_tool(robot: &Robot, chosen: &[Candidate], input: &Measuremen
     }
     let on_tool = |probe: &Probe| probe.frame.name == TCP_FRAME;
     let mut readings = input.measurements.readings.iter();
-    let seen = readings.find(|reading| match &reading.kind {
+    let at_tool = readings.find(|reading| match &reading.kind {
         ReadingKind::Response(response) => on_tool(&response.watched) || on_tool(&response.hit),
         ReadingKind::Shape(shape) => shape.probes.iter().any(on_tool),
         _ => false,
     });
-    match seen {
+    match at_tool {
         Some(Reading { name: reading, .. }) => Err(refused(format!(
             "{reading} is measured or excited at a node on the tool, which {} would move: define the node on the link \
              that carries the sensor, with its position there",

@@ -1,17 +1,16 @@
 //! Gear stiffness from recorded positions of motors and links: torques of the rigid robot along the
 //! motion of its links, filters, and the reading for the fit.
 
-use crate::estimation::{GearEstimate, GearOutput, Parameter, Reading, ReadingKind, gear_stiffness};
 use flexarm_analysis::signal::LowPass;
 use flexarm_kinematics::{Data, Mechanism, Model, State, inverse_dynamics};
+use flexarm_run::{Arm, Error};
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 
 use super::error::at_place;
 use super::file::{EncoderRecording, MeasurementInput};
 use super::parameters::{Candidate, ParameterLocation, candidates};
-use flexarm_run::Arm;
-use flexarm_run::Error;
+use crate::estimation::{GearEstimate, GearOutput, Parameter, Reading, ReadingKind, gear_stiffness};
 
 /// Result for one gear from recordings. SI units.
 #[derive(Clone, Debug, Serialize)]
@@ -45,7 +44,7 @@ pub struct EncoderFigures {
     /// (rad, m).
     #[serde(skip)]
     pub curves: Vec<[Vec<f64>; 2]>,
-    /// Whether the recordings determine the stiffness ([`GearEstimate::is_told`]).
+    /// Whether the recordings determine the stiffness ([`GearEstimate::is_determined`]).
     pub told: bool,
     /// Name of the parameter.
     #[serde(skip)]
@@ -66,7 +65,7 @@ impl EncoderFigures {
             std: gear.std_ln.hypot(unexplained(&gear, noise_rms)) * gear.stiffness.abs(),
             delay_s: gear.delay_s,
             r2: gear.r2,
-            told: gear.is_told(),
+            told: gear.is_determined(),
             curves: gear.curves,
             unseen_r2: gear.unseen_r2,
             without_each: gear.without_each,
@@ -158,7 +157,7 @@ struct Gears<'a> {
     /// These joints in the robot's order of joints.
     places: Vec<usize>,
     /// Joints with an encoder on the link side.
-    seen: Vec<usize>,
+    outputs: Vec<usize>,
     /// Motors whose springs are to be identified.
     unknown: Vec<(usize, &'a Parameter)>,
 }
@@ -175,30 +174,30 @@ impl<'a> Gears<'a> {
         let place = |joint: &String| of_robot.iter().position(|own| own == joint);
         let places: Vec<usize> = joints.iter().filter_map(place).collect();
         let has = |run: &Smooth<'_>, k: usize| run.recording.link[places[k]].is_some();
-        let seen: Vec<usize> = (0..places.len()).filter(|k| runs.iter().any(|r| has(r, *k))).collect();
-        if seen.is_empty() {
+        let outputs: Vec<usize> = (0..places.len()).filter(|k| runs.iter().any(|r| has(r, *k))).collect();
+        if outputs.is_empty() {
             return Ok(None);
         }
         let file = &runs[0].recording.place;
         let missing = |k: &&usize| joints.len() > 1 && !runs.iter().all(|r| has(r, **k));
-        if let Some(k) = seen.iter().find(missing) {
+        if let Some(k) = outputs.iter().find(missing) {
             let text = format!(
                 "joint {:?} has coupled gears, and only some recordings contain its encoder: give it in all of them",
                 joints[*k]
             );
             return Err(at_place(file, text));
         }
-        let shown = |motor: &usize| seen.iter().any(|i| C[(*i, *motor)] != 0.0);
+        let shown = |motor: &usize| outputs.iter().any(|i| C[(*i, *motor)] != 0.0);
         let unknown: Vec<(usize, &Parameter)> = (0..places.len())
             .filter(shown)
             .filter_map(|motor| Some((motor, gearbox_of(chosen, &joints[motor])?)))
             .collect();
         if unknown.is_empty() {
-            let names: Vec<&String> = seen.iter().map(|k| &joints[*k]).collect();
+            let names: Vec<&String> = outputs.iter().map(|k| &joints[*k]).collect();
             let text = format!("{names:?} have encoders, but no gearbox with a single stiffness to fit");
             return Err(at_place(file, text));
         }
-        Ok(Some(Self { runs, joints, C, all, places, seen, unknown }))
+        Ok(Some(Self { runs, joints, C, all, places, outputs, unknown }))
     }
 
     /// Returns the deflection of a joint per compliance of a motor's spring, `C_im Σ_j C_jm τ_j`,
@@ -206,7 +205,7 @@ impl<'a> Gears<'a> {
     fn per_compliance(&self, run: &Smooth<'_>, torque: &[Vec<f64>], i: usize, motor: usize) -> Vec<f64> {
         let C = &self.C;
         let of = |s: usize| self.places.iter().enumerate().map(|(j, k)| C[(j, motor)] * torque[*k][s]).sum::<f64>();
-        run.seen.clone().map(|s| C[(i, motor)] * of(s)).collect()
+        run.kept.clone().map(|s| C[(i, motor)] * of(s)).collect()
     }
 
     /// Returns the deflection of a joint that the springs to be identified cause. Springs that are
@@ -227,8 +226,8 @@ impl<'a> Gears<'a> {
 
     /// Estimates the springs of the motors.
     fn figures(&self) -> Result<Vec<EncoderFigures>, Error> {
-        let outputs = |run: &Smooth<'_>| self.seen.iter().map(|i| self.output(run, *i)).collect();
-        let all_runs: Vec<Vec<GearOutput>> = self.runs.iter().filter_map(outputs).collect();
+        let of_run = |run: &Smooth<'_>| self.outputs.iter().map(|i| self.output(run, *i)).collect();
+        let all_runs: Vec<Vec<GearOutput>> = self.runs.iter().filter_map(of_run).collect();
         let name = |motor: usize| &self.joints[motor];
         let gears = gear_stiffness(&all_runs).ok_or_else(|| {
             let names: Vec<&String> = self.unknown.iter().map(|(motor, _)| name(*motor)).collect();
@@ -238,9 +237,9 @@ impl<'a> Gears<'a> {
             );
             at_place(&self.runs[0].recording.place, text)
         })?;
-        let squares = self.seen.iter().map(|k| noise(self.runs, self.places[*k]).powi(2));
-        let noise = (squares.sum::<f64>() / self.seen.len() as f64).sqrt();
-        let steps = steps(self.runs, self.places[self.seen[0]]);
+        let squares = self.outputs.iter().map(|k| noise(self.runs, self.places[*k]).powi(2));
+        let noise = (squares.sum::<f64>() / self.outputs.len() as f64).sqrt();
+        let steps = steps(self.runs, self.places[self.outputs[0]]);
         let figure = |((motor, parameter), gear): (&(usize, &Parameter), GearEstimate)| {
             EncoderFigures::of(name(*motor), gear, parameter, noise, &steps)
         };
@@ -267,7 +266,8 @@ struct Smooth<'a> {
     /// of the noise of the links' encoders.
     instrument: Vec<Vec<f64>>,
     low: LowPass,
-    seen: std::ops::Range<usize>,
+    /// Samples between the edges.
+    kept: std::ops::Range<usize>,
 }
 
 impl<'a> Smooth<'a> {
@@ -312,13 +312,13 @@ impl<'a> Smooth<'a> {
         };
         let [torque, instrument] = [&link, &motor].map(|motion| smoothed(torques(model, motion, step_s)));
         let rate = motor.iter().map(|q| low.of(&derivatives(q, step_s)[0])).collect();
-        Ok(Self { recording, rate, torque, instrument, low, seen: edge..n - edge - 1 })
+        Ok(Self { recording, rate, torque, instrument, low, kept: edge..n - edge - 1 })
     }
 
     /// Returns deflection and velocity of a joint with an encoder on its link side, without torques.
     fn gear(&self, joint: usize) -> Option<GearOutput> {
         let link = self.recording.link[joint].as_ref()?;
-        let cut = |x: &[f64]| x[self.seen.clone()].to_vec();
+        let cut = |x: &[f64]| x[self.kept.clone()].to_vec();
         let deflection: Vec<f64> =
             self.recording.motor[joint].iter().zip(link).map(|(motor, link)| motor - link).collect();
         let deflection = self.low.of(&self.low.of(&deflection));

@@ -1,11 +1,8 @@
 //! Errors of an identification.
 
-use crate::estimation::{FoundSlip, IdentifyError, Slip};
-use flexarm_run::ExternalError;
+use flexarm_run::{Error, ExternalError, RobotFileError};
 
-use super::file::MeasurementInput;
-use flexarm_run::Error;
-use flexarm_run::RobotFileError;
+use crate::estimation::{FoundSlip, Slip};
 
 /// Measurements that cannot be used for an identification; the message has what was found and the
 /// remedy.
@@ -61,23 +58,4 @@ pub(super) fn of_slip(found: FoundSlip, joints: &[(String, bool)]) -> Error {
         "the places do not fit the robot (residual {rest:.0} %), but they do if {likely} (residual {mended:.0} %): \
          check the readings"
     ))
-}
-
-/// Returns the error of the fit with names instead of numbers of instruments.
-pub(super) fn of_names(input: &MeasurementInput) -> impl Fn(IdentifyError) -> Error + '_ {
-    |error| {
-        let text = error.to_string();
-        let named = input.instruments.iter().enumerate().fold(text, |text, (k, name)| {
-            text.replace(&format!("instrument {k}:"), &format!("instrument {name:?}:"))
-                .replace(
-                    &format!("the pose of instrument {k} in the world"),
-                    &format!("the pose of instrument {name:?} in the world"),
-                )
-                .replace(
-                    &format!("the orientation of instrument {k} in the world"),
-                    &format!("the orientation of instrument {name:?} in the world"),
-                )
-        });
-        refused(named)
-    }
 }

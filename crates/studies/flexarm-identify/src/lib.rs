@@ -4,6 +4,12 @@
 //! parameters and their uncertainty; [`plan_measurements`] chooses poses. The underlying functions
 //! on plain values are re-exported: [`identify`], [`plan`], [`MeasuredArm`].
 //!
+//! ```text
+//! file -> Measurements --+
+//! arm -> Parameter, ... -+-> identify -> Identified -> answer, page, rewrite
+//! ```
+//! Not here: the model of the arm (`flexarm-run`), equilibria and modes (`flexarm-stepping`).
+//!
 //! ```
 //! use flexarm_identify::{frequency_slopes, nominal, parameters};
 //! use flexarm_run::{Modelling, Robot};
@@ -21,8 +27,8 @@
 #![allow(non_snake_case, reason = "monogram notation: X_WT, J; see docs/references.md")]
 
 mod answer;
+mod caveats;
 mod choose;
-mod doubts;
 mod encoders;
 mod error;
 mod estimation;
@@ -38,22 +44,17 @@ mod units;
 
 use std::path::{Path, PathBuf};
 
-pub use crate::estimation::*;
 use flexarm_files::{check_apart, check_free, write_all};
+use flexarm_run::caveat::{Use, warnings};
+use flexarm_run::{Arm, Error, Modelling, Robot};
 
 use self::answer::answer;
+use self::caveats::{empty_caveat, encoder_caveats, frame_caveat, gear_caveat, load_caveats};
 use self::choose::{check_tool, chosen};
-use self::doubts::{empty_caveat, encoder_caveats, frame_caveat, gear_caveat, load_caveats};
-use self::error::{of_names, of_slip, refused};
+use self::error::{of_slip, refused};
 use self::file::{Cell, MeasurementInput};
 use self::parameters::ParameterLocation;
 use self::units::{check_modes, check_units};
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Modelling;
-use flexarm_run::Robot;
-use flexarm_run::caveat::Use;
-use flexarm_run::caveat::warnings;
 
 pub use self::answer::{
     Compared, FoundFrame, FoundPoint, HeldOutFigures, Identification, Residual, ResponseCurves, ShapeFigures,
@@ -61,6 +62,7 @@ pub use self::answer::{
 };
 pub use self::encoders::EncoderFigures;
 pub use self::error::IdentifyFileError;
+pub use self::estimation::*;
 pub use self::plan_file::{MeasurementPlan, PlanRequest, PlannedReading, plan_measurements};
 
 /// Returns the arm as model for the identification: tree, springs, TCP.
@@ -121,6 +123,7 @@ pub fn identify_robot_watched(
 ) -> Result<Identification, Error> {
     let arm = robot.model(&request.modelling)?;
     let joints = joints_of(&arm);
+    // Readings and parameters; encoders give readings of their own.
     let mut input = file::read(measurements, &Cell { joints: &joints, arm: &arm })?;
     let chosen = chosen(&arm, &input, &request.fit)?;
     let encoders = encoders::encoder_figures(&arm, &input, &chosen)?;
@@ -135,6 +138,7 @@ pub fn identify_robot_watched(
         Some(folder) => Some(Targets::in_folder(folder, robot, measurements, request.overwrite)?),
         None => None,
     };
+    // Mistakes in the readings are refused before a fit hides them.
     check_tool(robot, &chosen, &input)?;
     let nominal = nominal(&arm);
     check_modes(&nominal, &input)?;
@@ -144,9 +148,11 @@ pub fn identify_robot_watched(
     if let Some(slip) = likely_slip(&nominal, &parameters, &input.measurements, &slides) {
         return Err(of_slip(slip, &joints));
     }
+    // The fit, and what limits its validity.
     let options =
         IdentifyOptions { search: Search { loss: input.loss, ..Search::default() }, ..IdentifyOptions::default() };
-    let found = identify(&nominal, &parameters, &input.measurements, &options, watch).map_err(of_names(&input))?;
+    let found = identify(&nominal, &parameters, &input.measurements, &options, watch)
+        .map_err(|error| refused(error.to_string()))?;
     let mut answer = answer(robot, measurements, &nominal, &parameters, &input, &found)?;
     answer.caveats.extend(frame_caveat(&answer));
     answer.caveats.extend(gear_caveat(robot));
@@ -177,6 +183,7 @@ struct Targets {
 }
 
 impl Targets {
+    /// Returns the files in a folder, none of which may be an input or exist already.
     fn in_folder(folder: &Path, robot: &Robot, measurements: &Path, overwrite: bool) -> Result<Self, Error> {
         let targets = Self { robot: folder.join("robot.toml"), page: folder.join("identification.html") };
         let all = [targets.robot.clone(), targets.page.clone()];
@@ -185,6 +192,7 @@ impl Targets {
         Ok(targets)
     }
 
+    /// Writes the robot file with the identified values, and the page; names both in the answer.
     fn write(
         self,
         robot: &Robot,

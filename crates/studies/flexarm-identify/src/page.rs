@@ -147,8 +147,8 @@ fn residuals(kind: &str, unit: &str, of: &[&Compared]) -> String {
 
 /// Plots the magnitude of a frequency response: measured, and of the model before and after.
 fn response_plot(response: &ResponseCurves) -> String {
-    let looks = [CurveLook::Dots, CurveLook::Dashed, CurveLook::Plain];
-    let curves = ["measured", "model before", "model after"].into_iter().zip(looks).zip(&response.magnitude);
+    let styles = [CurveLook::Dots, CurveLook::Dashed, CurveLook::Plain];
+    let curves = ["measured", "model before", "model after"].into_iter().zip(styles).zip(&response.magnitude);
     let curves =
         curves.map(|((name, look), y)| PlotCurve { name: name.into(), look, x: response.hz.clone(), y: y.clone() });
     let label = format!("magnitude [{}]", response.unit);

@@ -1,20 +1,14 @@
 //! Identifiable parameters of a robot file: their names, their effect on the arm, and their places
 //! in the file. `docs/identify.md` lists the names.
 
-use crate::estimation::{Effect, LinkPart, Parameter, SpringPart};
 use flexarm_flexlink::{GearStiffness, SEAT};
 use flexarm_kinematics::{JointMotion, LinkInertia, SpatialInertia};
+use flexarm_run::robot::PAYLOAD_LINK;
+use flexarm_run::{Arm, Drive, GuideTilt, Owner, Robot, RobotLink, RobotMounting};
 use flexarm_stepping::{Damping, GuideTerm, SpringCurve};
 use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
-use flexarm_run::Arm;
-use flexarm_run::Drive;
-use flexarm_run::GuideTilt;
-use flexarm_run::Owner;
-use flexarm_run::Robot;
-use flexarm_run::RobotLink;
-use flexarm_run::RobotMounting;
-use flexarm_run::robot::PAYLOAD_LINK;
+use crate::estimation::{Effect, LinkPart, Parameter, SpringPart};
 
 /// Key of parameters that are fitted only if named explicitly: together the directions make up the
 /// whole stiffness of a link.

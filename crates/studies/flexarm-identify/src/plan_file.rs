@@ -1,27 +1,27 @@
 //! Choice of poses and loads to measure on a robot, and the files to fill in.
+//!
+//! Start at [`plan_measurements`]. Candidates are all pairs of a pose and a load; poses come from a table or
+//! are spread over the joint ranges, loads from the request or from the effort limits. Not here: the
+//! choice among the candidates ([`crate::plan`]), the limits of the drives ([`super::plan_load`]).
 
 use std::path::{Path, PathBuf};
 
-use crate::estimation::{
-    Component, LoadCase, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind, Row, plan,
-};
 use flexarm_files::{NumberTable, check_apart, check_free, write_all};
 use flexarm_kinematics::Wrench;
+use flexarm_run::caveat::size::halton;
+use flexarm_run::caveat::{Use, warnings};
+use flexarm_run::{Arm, Error, Finding, Modelling, Robot};
 use flexarm_settings::written::csv_field;
-use nalgebra::Vector3;
+use nalgebra::{DVector, Vector3};
 use serde::Serialize;
 
 use super::error::refused;
 use super::plan_load::Efforts;
 use super::{joints_of, nominal};
-use flexarm_run::Arm;
-use flexarm_run::Error;
-use flexarm_run::Finding;
-use flexarm_run::Modelling;
-use flexarm_run::Robot;
-use flexarm_run::caveat::Use;
-use flexarm_run::caveat::size::halton;
-use flexarm_run::caveat::warnings;
+use crate::estimation::{
+    Component, LoadCase, MeasuredArm, Measurements, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind,
+    Row, plan,
+};
 
 /// Number of candidate poses if none are given.
 const CANDIDATES: usize = 400;
@@ -215,6 +215,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         return Err(refused(text));
     }
     let targets = request.targets()?;
+    // Parameters, poses, and forces that the drives hold there.
     let fitted = super::chosen(&arm, &super::MeasurementInput::default(), &request.fit)?;
     let fitted: Vec<Parameter> = fitted.into_iter().map(|candidate| candidate.parameter).collect();
     let poses = match &request.poses {
@@ -227,6 +228,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         request.forces = efforts.default_forces(&or_tcp(&request.levers));
     }
     let request = &request;
+    // Candidates, and the readings whose uncertainty the plan minimises.
     let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
     let pairs = allowed(&efforts, poses.len(), &request.setups(), if chosen_forces { 0 } else { request.count });
     let candidates: Vec<Reading> = pairs.iter().map(|(pose, setup)| reading(&poses[*pose], setup)).collect();
@@ -237,6 +239,7 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         }
         None => Vec::new(),
     };
+    // The choice, with what it demands of the drives.
     let nominal = nominal(&arm);
     let options = PlanOptions { count: request.count, purpose };
     let [best, first] = plans(&nominal, &fitted, &candidates, &options)?;
@@ -302,6 +305,7 @@ fn plans(
     Ok([best, plan_of(&candidates[..options.count.min(candidates.len())])?])
 }
 
+/// Returns the expected uncertainty of a parameter from that of its search coordinate.
 fn expected((parameter, std): (&Parameter, &f64)) -> ExpectedParameter {
     ExpectedParameter {
         name: parameter.name.clone(),
@@ -311,6 +315,7 @@ fn expected((parameter, std): (&Parameter, &f64)) -> ExpectedParameter {
     }
 }
 
+/// Returns the displacement from no load to the force of a setup, in all axes or along its direction.
 fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
     let wrench = Wrench::new(Vector3::from(setup.force), Vector3::zeros());
     let all = [Vector3::x(), Vector3::y(), Vector3::z()];
@@ -319,7 +324,7 @@ fn displacement(q: &[f64], setup: &Setup, std: f64) -> Reading {
         before: LoadCase::none(),
         after: LoadCase { wrench, at: Vector3::from(setup.at), ..LoadCase::none() },
         point: Vector3::from(setup.point),
-        rows: axes.into_iter().map(|d| Row { of: Component::Along(d), value: 0.0, std }).collect(),
+        rows: axes.into_iter().map(|d| Row { of: Component::along(d), value: 0.0, std }).collect(),
     };
     Reading { name: format!("pose {q:?}"), q: q.to_vec(), kind }
 }
@@ -343,27 +348,26 @@ fn spread_poses(arm: &Arm) -> Vec<Vec<f64>> {
 /// Reads poses from a table with a column per joint.
 fn poses_of(path: &Path, joints: &[String]) -> Result<Vec<Vec<f64>>, Error> {
     let table = NumberTable::read(path)?;
-    let fail = |what: String| Error::File { path: path.to_owned(), what };
     let columns = joints.iter().map(|joint| {
-        table
-            .column(joint)
-            .ok_or_else(|| fail(format!("there is no column for joint {joint:?}; found {:?}", table.names)))
+        let missing = || format!("there is no column for joint {joint:?}; found {:?}", table.names);
+        table.column(joint).ok_or_else(|| table.error(None, missing()))
     });
     let columns = columns.collect::<Result<Vec<_>, _>>()?;
-    let row = |(number, row): (usize, &Vec<f64>)| -> Result<Vec<f64>, Error> {
+    let pose = |(number, row): (usize, &Vec<f64>)| -> Result<Vec<f64>, Error> {
         let q: Vec<f64> = columns.iter().map(|k| row[*k]).collect();
-        match q.iter().all(|x| x.is_finite()) {
-            true => Ok(q),
-            false => Err(fail(format!("line {}: a joint has no value", table.lines[number]))),
+        match q.iter().position(|x| !x.is_finite()) {
+            None => Ok(q),
+            Some(k) => Err(table.error(Some(number), format!("joint {:?} has no value", joints[k])).into()),
         }
     };
-    let poses = table.rows.iter().enumerate().map(row).collect::<Result<Vec<_>, _>>()?;
-    if poses.is_empty() {
-        return Err(fail("the table has no poses".into()));
+    let poses = table.rows.iter().enumerate().map(pose).collect::<Result<Vec<_>, _>>()?;
+    match poses.is_empty() {
+        true => Err(table.error(None, "the table has no poses").into()),
+        false => Ok(poses),
     }
-    Ok(poses)
 }
 
+/// Returns the chosen readings with the displacements that the robot file as it is predicts.
 fn planned(
     nominal: &NominalArm,
     candidates: &[Reading],
@@ -374,9 +378,9 @@ fn planned(
         let setup = pairs[*number].1;
         let q = candidates[*number].q.clone();
         let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
-        let measurements = crate::estimation::Measurements { readings: vec![reading], ..Default::default() };
-        let arm = crate::estimation::MeasuredArm { nominal, parameters: &[], measurements: &measurements };
-        let moved = arm.predicted(&nalgebra::DVector::zeros(0)).map_err(|e| refused(e.to_string()))?;
+        let measurements = Measurements { readings: vec![reading], ..Measurements::default() };
+        let arm = MeasuredArm { nominal, parameters: &[], measurements: &measurements };
+        let moved = arm.predicted(&DVector::zeros(0)).map_err(|e| refused(e.to_string()))?;
         let Setup { force, at, point, direction } = setup;
         Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })
     };

@@ -1,21 +1,24 @@
 //! Frequency responses and mode shapes in a file of measurements: points of the arm, tables and
 //! universal files, units.
+//!
+//! Start at [`Reader::response`] and [`Reader::shape`]. A response is first a [`Curve`] with the names
+//! of its nodes, then resolved to points of the arm. Not here: universal files ([`super::uff`]).
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::estimation::{Answer, Form, MeasuredResponse, MeasuredShape, Probe, Reading, ReadingKind};
-use flexarm_files::{NumberTable, named_file};
+use flexarm_files::{NumberTable, TextFileError, named_file};
 use flexarm_kinematics::{Data, Frame, Pose, forward_kinematics};
+use flexarm_run::Error;
+use flexarm_settings::Place;
 use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::file::{Joints, LoadEntry, Reader};
+use super::file::{Joints, LoadEntry, Reader, Site, located};
 use super::uff::{UffFunction, read_functions};
-use flexarm_run::Error;
+use crate::estimation::{Answer, Form, MeasuredResponse, MeasuredShape, Probe, Reading, ReadingKind};
 
 /// Maximum size of a universal file (bytes).
 const LARGEST: u64 = 1 << 30;
@@ -130,31 +133,28 @@ impl Reader<'_> {
         nodes: &BTreeMap<String, Spanned<NodeEntry>>,
         entry: &Spanned<ResponseEntry>,
     ) -> Result<(), Error> {
-        let (e, span) = (entry.get_ref(), entry.span());
-        let located = |message| self.error(e.file.span(), message);
-        let path = named_file("file", e.file.get_ref(), self.folder).map_err(located)?;
+        let (e, site) = (entry.get_ref(), Site::from(entry));
+        let path = named_file("file", e.file.get_ref(), self.folder).map_err(|message| self.error(&e.file, message))?;
         let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
         let curves = match ending.as_str() {
             "uff" | "unv" | "ufb" | "bunv" => self.universal(&path, e)?,
             _ => vec![self.curve(&path, e)?],
         };
-        let form = match e.form.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+        let form = match e.form.as_ref().map(|word| (word.get_ref().as_str(), word)) {
             None | Some(("log", _)) => Form::Logarithmic,
             Some(("complex", _)) => Form::Complex,
             Some((other, at)) => {
                 return Err(self.error(at, format!("form = {other:?} is not known; use \"log\" or \"complex\"")));
             }
         };
-        let (q, load) = (self.joints(&e.joints)?, self.load(&e.load, &span)?);
-        let own = self.std(e.std.as_ref(), 1.0)?;
+        let (q, load) = (self.joints(&e.joints)?, self.load(&e.load, &site)?);
+        let own = self.std(located(&e.std), 1.0)?;
         for curve in curves {
             let kept = self.kept(&curve, e)?;
             let columns = kept.iter().all(|(.., std)| std.is_some());
             if e.std.is_some() && columns {
-                return Err(self.error(
-                    span.clone(),
-                    format!("{}: std is given both in the table and here: remove one of them", curve.name),
-                ));
+                let text = format!("{}: std is given both in the table and here: remove one of them", curve.name);
+                return Err(self.error(&site, text));
             }
             let point = |(hz, value, std): &Point| {
                 let std = std.unwrap_or(own);
@@ -162,8 +162,8 @@ impl Reader<'_> {
             };
             let kind = ReadingKind::Response(MeasuredResponse {
                 load: load.clone(),
-                watched: self.probe(nodes, &curve.watched, &q, &span)?,
-                hit: self.probe(nodes, &curve.hit, &q, &span)?,
+                watched: self.probe(nodes, &curve.watched, &q, &site)?,
+                hit: self.probe(nodes, &curve.hit, &q, &site)?,
                 answer: curve.answer,
                 form,
                 points: kept.iter().map(point).collect(),
@@ -182,12 +182,10 @@ impl Reader<'_> {
         let counts = |(hz, value, _): &&Point| *hz > 0.0 && *hz >= from && *hz <= to && value.norm() > 0.0;
         let kept: Vec<_> = curve.values.iter().filter(counts).step_by(every).copied().collect();
         match kept.len() {
-            0 => Err(self.error(
-                e.file.span(),
-                format!("{}: no nonzero value from {from} to {to} Hz: check from and to", curve.name),
-            )),
+            0 => Err(self
+                .error(&e.file, format!("{}: no nonzero value from {from} to {to} Hz: check from and to", curve.name))),
             n if n > MAX_POINTS => Err(self.error(
-                e.file.span(),
+                &e.file,
                 format!("{}: {n} frequencies, the maximum is {MAX_POINTS}: use from, to and every", curve.name),
             )),
             _ => Ok(kept),
@@ -199,52 +197,48 @@ impl Reader<'_> {
         let found = UNITS.iter().find(|(name, ..)| name == unit.get_ref());
         found.map(|(_, answer, factor)| (*answer, *factor)).ok_or_else(|| {
             let names: Vec<&str> = UNITS.iter().map(|(name, ..)| *name).collect();
-            self.error(unit.span(), format!("unit = {:?} is not known; use one of {names:?}", unit.get_ref()))
+            self.error(unit, format!("unit = {:?} is not known; use one of {names:?}", unit.get_ref()))
         })
     }
 
     /// Reads a response from a table.
     fn curve(&self, path: &Path, e: &ResponseEntry) -> Result<Curve, Error> {
         let table = NumberTable::read(path)?;
-        let fail = |what: String| Error::File { path: path.to_owned(), what };
         let known = ["hz", "re", "im", "magnitude", "phase", "std"];
         if let Some(stray) = table.names.iter().find(|name| !known.contains(&name.as_str())) {
-            return Err(fail(format!(
-                "column {stray:?} is not known; expected hz, re and im or magnitude and phase, and std"
-            )));
+            let text = format!("column {stray:?} is not known; expected hz, re and im or magnitude and phase, and std");
+            return Err(table.error(None, text).into());
         }
         let column = |name: &str| table.column(name);
-        let hz = column("hz").ok_or_else(|| fail("there is no column hz".into()))?;
+        let hz = column("hz").ok_or_else(|| table.error(None, "there is no column hz"))?;
         let pair = match (column("re"), column("im"), column("magnitude"), column("phase")) {
             (Some(re), Some(im), None, None) => (re, im, false),
             (None, None, Some(size), Some(phase)) => (size, phase, true),
-            _ => return Err(fail("expected the columns re and im, or magnitude and phase".into())),
+            _ => return Err(table.error(None, "expected the columns re and im, or magnitude and phase").into()),
         };
         let Some(unit) = &e.unit else {
             return Err(self.error(
-                e.file.span(),
+                &e.file,
                 "a table needs the unit of the measured quantity per force, such as unit = \"m/s2/N\"",
             ));
         };
         let (answer, factor) = self.unit(unit)?;
         let mut values = Vec::with_capacity(table.rows.len());
-        for (row, line) in table.rows.iter().zip(&table.lines) {
+        for (number, row) in table.rows.iter().enumerate() {
             let (f, a, b) = (row[hz], row[pair.0], row[pair.1]);
             let std = column("std").map(|k| row[k]);
             let bad = |x: f64| !x.is_finite();
             if bad(f) || bad(a) || bad(b) || f < 0.0 || std.is_some_and(|std| bad(std) || std <= 0.0) {
-                return Err(fail(format!("line {line}: expected finite numbers, hz >= 0 and std > 0")));
+                return Err(table.error(Some(number), "expected finite numbers, hz >= 0 and std > 0").into());
             }
             let value = if pair.2 { Complex::from_polar(a, b * self.units.angle) } else { Complex::new(a, b) };
             values.push((f, value * factor, std));
         }
         let of = |node: &Option<Spanned<String>>, direction: &Option<Spanned<Direction>>, what: &str| {
             let Some(direction) = direction else {
-                return Err(
-                    self.error(e.file.span(), format!("a table needs a direction, such as {what}_direction = \"x\""))
-                );
+                return Err(self.error(&e.file, format!("a table needs a direction, such as {what}_direction = \"x\"")));
             };
-            let vector = direction.get_ref().vector().ok_or_else(|| self.error(direction.span(), NO_DIRECTION))?;
+            let vector = direction.get_ref().vector().ok_or_else(|| self.error(direction, NO_DIRECTION))?;
             Ok((node.as_ref().map(|node| node.get_ref().clone()), vector))
         };
         Ok(Curve {
@@ -266,17 +260,17 @@ impl Reader<'_> {
         let bytes = std::fs::read(path).map_err(|error| fail(error.to_string()))?;
         let given = [&e.watched, &e.hit].into_iter().flatten().next();
         if let Some(node) = given {
-            return Err(self.error(node.span(), "a universal file contains nodes and directions: remove them here"));
+            return Err(self.error(node, "a universal file contains nodes and directions: remove them here"));
         }
-        let functions = read_functions(&bytes).map_err(fail)?;
+        let functions = read_functions(path, &bytes)?;
         let one = |function: &UffFunction| {
-            let name = format!("{} line {}", e.file.get_ref().display(), function.line);
+            let name = Place::of_file(e.file.get_ref().display()).line(function.line).to_string();
             let (answer, factor) = match &e.unit {
                 Some(unit) => self.unit(unit)?,
                 None => unit_of(function).ok_or_else(|| {
                     let what = &function.unit;
                     self.error(
-                        e.file.span(),
+                        &e.file,
                         format!(
                             "{name}: the file does not define the measured quantity (label {what:?}): add its unit, \
                              such as unit = \"m/s2/N\""
@@ -287,10 +281,13 @@ impl Reader<'_> {
             let direction = |code: i64| match code {
                 1..=3 => Ok(Vector3::ith(code as usize - 1, 1.0)),
                 -3..=-1 => Ok(Vector3::ith(code.unsigned_abs() as usize - 1, -1.0)),
-                _ => Err(fail(format!(
-                    "line {}: direction {code}: expected 1 to 3 or -1 to -3 for x, y, z",
-                    function.line
-                ))),
+                _ => Err(TextFileError {
+                    path: path.to_owned(),
+                    line: function.line,
+                    column: 1,
+                    message: format!("direction {code}: expected 1 to 3 or -1 to -3 for x, y, z"),
+                    page: "measurements",
+                }),
             };
             let place = |(node, code): (i64, i64)| Ok::<_, Error>((Some(node.to_string()), direction(code)?));
             Ok(Curve {
@@ -311,24 +308,24 @@ impl Reader<'_> {
         number: usize,
         entry: &Spanned<ShapeEntry>,
     ) -> Result<(), Error> {
-        let (e, span) = (entry.get_ref(), entry.span());
+        let (e, site) = (entry.get_ref(), Site::from(entry));
         let (names, directions, amplitudes) = (e.nodes.get_ref(), e.directions.get_ref(), e.amplitudes.get_ref());
         if names.len() != directions.len() || names.len() != amplitudes.len() || names.len() < 2 {
             let (a, b, c) = (names.len(), directions.len(), amplitudes.len());
             let text = format!("{a} nodes, {b} directions, {c} amplitudes: expected equal numbers of at least two");
-            return Err(self.error(span, text));
+            return Err(self.error(site, text));
         }
         let amplitudes = DVector::from_column_slice(amplitudes);
         if !(amplitudes.norm().is_finite() && amplitudes.norm() > 0.0) {
-            return Err(self.error(e.amplitudes.span(), "amplitudes: expected finite numbers that are not all zero"));
+            return Err(self.error(&e.amplitudes, "amplitudes: expected finite numbers that are not all zero"));
         }
         let q = self.joints(&e.joints)?;
         let probe = |(name, direction): (&String, &Direction)| {
-            let vector = direction.vector().ok_or_else(|| self.error(e.directions.span(), NO_DIRECTION))?;
-            self.probe(nodes, &(Some(name.clone()), vector), &q, &span)
+            let vector = direction.vector().ok_or_else(|| self.error(&e.directions, NO_DIRECTION))?;
+            self.probe(nodes, &(Some(name.clone()), vector), &q, &site)
         };
         let probes = names.iter().zip(directions).map(probe).collect::<Result<Vec<Probe>, Error>>()?;
-        let (std, load) = (self.std(e.std.as_ref(), 1.0)?, self.load(&e.load, &span)?);
+        let (std, load) = (self.std(located(&e.std), 1.0)?, self.load(&e.load, &site)?);
         let kind = ReadingKind::Shape(MeasuredShape { load, probes, amplitudes, std });
         self.measurements.readings.push(Reading { name: format!("shape {}", number + 1), q, kind });
         Ok(())
@@ -340,17 +337,14 @@ impl Reader<'_> {
         nodes: &BTreeMap<String, Spanned<NodeEntry>>,
         (name, direction): &(Option<String>, Vector3<f64>),
         q: &[f64],
-        span: &Range<usize>,
+        site: &Site<'_>,
     ) -> Result<Probe, Error> {
         let arm = self.cell.arm;
         let tool = || arm.tcp.clone();
         let Some(name) = name else { return Ok(Probe { frame: tool(), direction: *direction }) };
         let node = nodes.get(name).ok_or_else(|| {
             let known: Vec<&String> = nodes.keys().collect();
-            self.error(
-                span.clone(),
-                format!("there is no [node.{name}]; the file has {known:?}: add it with link and xyz"),
-            )
+            self.error(site, format!("there is no [node.{name}]; the file has {known:?}: add it with link and xyz"))
         })?;
         let NodeEntry { link, xyz, axes } = node.get_ref();
         let frame = match link {
@@ -358,11 +352,11 @@ impl Reader<'_> {
             Some(link) => self.moving_link(link)?,
         };
         if xyz.iter().any(|x| !x.is_finite()) {
-            return Err(self.error(node.span(), "xyz: expected finite numbers"));
+            return Err(self.error(node, "xyz: expected finite numbers"));
         }
         let at = Translation3::from(Vector3::from(*xyz) * self.units.length);
         let frame = Frame { X_BF: frame.X_BF * Pose::from_parts(at, Rotation3::identity()), ..frame };
-        let direction = match axes.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+        let direction = match axes.as_ref().map(|word| (word.get_ref().as_str(), word)) {
             None | Some(("world", _)) => *direction,
             Some(("frame", _)) => {
                 let mut all = DVector::zeros(arm.model.nv());

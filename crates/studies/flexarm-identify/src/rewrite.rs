@@ -1,9 +1,10 @@
 //! Replacement of values in a robot file by identified ones; everything else stays as written.
+//!
+//! Start at [`rewritten`]. Each value goes to its [`ParameterLocation`]; poses are composed of several
+//! values ([`put_tool`], [`put_frames`]). Frames: L link of the tool, T tool.
 
 use std::path::Path;
 
-use crate::estimation::FittedParameter;
-use crate::estimation::parameter::displacement;
 use flexarm_kinematics::Pose;
 use flexarm_run::Calibration;
 use flexarm_stepping::GuideTerm;
@@ -11,6 +12,8 @@ use nalgebra::{Matrix6, Rotation3, Translation3, Vector3};
 use toml_edit::{Array, ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, Value};
 
 use super::parameters::ParameterLocation;
+use crate::estimation::FittedParameter;
+use crate::estimation::parameter::displacement;
 
 /// Returns the text of the robot file with the identified values; each is listed in a comment with
 /// its standard deviation.
@@ -45,46 +48,84 @@ pub fn rewritten(
 }
 
 /// Writes one value to its place; the pose of the tool and the joint frames are left to [`put_tool`]
-/// and [`put_frames`].
+/// and [`put_frames`]. Returns `None` without a place.
 fn put(file: &mut DocumentMut, found: &FittedParameter, written: &ParameterLocation) -> Option<()> {
-    let number = exact(found.value);
     match written {
-        ParameterLocation::Gearbox { joint, entry } => {
-            let drive = named(file, "drive", "joint", joint)?;
-            put_number(inside(drive, &["gearbox", "stiffness"])?, *entry, found)?;
-            inside(drive, &["gearbox"])?.as_table_like_mut()?.insert("identified", toml_edit::value(true));
+        ParameterLocation::Gearbox { joint, .. }
+        | ParameterLocation::Seat { joint, .. }
+        | ParameterLocation::GearboxDamping { joint, .. }
+        | ParameterLocation::Guide { joint, .. } => {
+            put_in_gearbox(inside(named(file, "drive", "joint", joint)?, &["gearbox"])?, found, written)
         }
-        ParameterLocation::Seat { joint, entry } => {
-            let drive = named(file, "drive", "joint", joint)?;
-            put_number(inside(drive, &["gearbox", "seat"])?, Some(*entry), found)?;
+        ParameterLocation::Link { link }
+        | ParameterLocation::LinkDirection { link, .. }
+        | ParameterLocation::LinkDamping { link }
+        | ParameterLocation::LinkEntry { link, .. }
+        | ParameterLocation::Mass { link, flexible: true } => {
+            put_in_link(named(file, "flexible_link", "link", link)?, found, written)
         }
-        ParameterLocation::GearboxDamping { joint, entry } => {
-            let drive = named(file, "drive", "joint", joint)?;
-            put_number(inside(drive, &["gearbox", "damping"])?, *entry, found)?;
+        ParameterLocation::Tool { .. } | ParameterLocation::Frame { .. } => Some(()),
+        ParameterLocation::Mounting { entry } => {
+            put_number(inside(file.as_table_mut(), &["mounting", "stiffness"])?, Some(*entry), found)
         }
-        ParameterLocation::Guide { joint, axis, term } => {
-            let tilt = ["gearbox", "guide", &axis.to_string()];
-            let tilt = inside(named(file, "drive", "joint", joint)?, &tilt)?.as_table_like_mut()?;
+        ParameterLocation::Payload => {
+            set(file.get_mut("payload")?.as_table_like_mut()?, "mass", exact(found.value));
+            Some(())
+        }
+        ParameterLocation::Mass { link, flexible: false } => {
+            set(entry_of(file, "inertial", "link", link)?, "mass", exact(found.value));
+            Some(())
+        }
+        ParameterLocation::Com { link, axis, com } => {
+            let entry = entry_of(file, "inertial", "link", link)?;
+            if entry.get("com").is_none() {
+                entry.insert("com", toml_edit::value(com.iter().copied().collect::<Array>()));
+            }
+            put_number(entry.get_mut("com")?, Some(*axis), found)
+        }
+    }
+}
+
+/// Writes a value to the `gearbox` of a `[[drive]]`.
+fn put_in_gearbox(gearbox: &mut Item, found: &FittedParameter, written: &ParameterLocation) -> Option<()> {
+    let gearbox = gearbox.as_table_like_mut()?;
+    match written {
+        ParameterLocation::Gearbox { entry, .. } => {
+            put_number(gearbox.get_mut("stiffness")?, *entry, found)?;
+            gearbox.insert("identified", toml_edit::value(true));
+            Some(())
+        }
+        ParameterLocation::Seat { entry, .. } => put_number(gearbox.get_mut("seat")?, Some(*entry), found),
+        ParameterLocation::GearboxDamping { entry, .. } => put_number(gearbox.get_mut("damping")?, *entry, found),
+        ParameterLocation::Guide { axis, term, .. } => {
+            let tilt = inside(gearbox, &["guide", &axis.to_string()])?.as_table_like_mut()?;
             let key = match term {
                 GuideTerm::Compliance(k) => return put_number(tilt.get_mut("compliance")?, Some(*k), found),
                 GuideTerm::Gap => "gap",
                 GuideTerm::Centre => "centre",
                 GuideTerm::Width => "width",
             };
-            set(tilt.get_mut("play")?.as_table_like_mut()?, key, number);
+            set(tilt.get_mut("play")?.as_table_like_mut()?, key, exact(found.value));
+            Some(())
         }
-        ParameterLocation::Link { link } => {
-            named(file, "flexible_link", "link", link)?.insert("stiffness_factor", toml_edit::value(number));
+        _ => None,
+    }
+}
+
+/// Writes a value to a `[[flexible_link]]`.
+fn put_in_link(link: &mut dyn TableLike, found: &FittedParameter, written: &ParameterLocation) -> Option<()> {
+    let number = exact(found.value);
+    match written {
+        ParameterLocation::Link { .. } => {
+            link.insert("stiffness_factor", toml_edit::value(number));
         }
-        ParameterLocation::LinkDirection { link, entry } => {
-            let link = named(file, "flexible_link", "link", link)?;
+        ParameterLocation::LinkDirection { entry, .. } => {
             if link.get("stiffness_factors").is_none() {
                 link.insert("stiffness_factors", toml_edit::value([1.0; 6].into_iter().collect::<Array>()));
             }
             put_number(link.get_mut("stiffness_factors")?, Some(*entry), found)?;
         }
-        ParameterLocation::LinkDamping { link } => {
-            let link = named(file, "flexible_link", "link", link)?;
+        ParameterLocation::LinkDamping { .. } => {
             let damping = link.get_mut("damping").and_then(Item::as_table_like_mut);
             match damping.and_then(|damping| damping.iter_mut().next().map(|(_, value)| value)) {
                 Some(value) => put_number(value, None, found)?,
@@ -94,27 +135,9 @@ fn put(file: &mut DocumentMut, found: &FittedParameter, written: &ParameterLocat
                 }
             }
         }
-        ParameterLocation::LinkEntry { link, row, column, K } => {
-            put_entry(named(file, "flexible_link", "link", link)?, (*row, *column), K, number)?;
-        }
-        ParameterLocation::Tool { .. } | ParameterLocation::Frame { .. } => {}
-        ParameterLocation::Mounting { entry } => {
-            put_number(inside(file.as_table_mut(), &["mounting", "stiffness"])?, Some(*entry), found)?;
-        }
-        ParameterLocation::Payload => set(file.get_mut("payload")?.as_table_like_mut()?, "mass", number),
-        ParameterLocation::Mass { link, flexible: true } => {
-            set(named(file, "flexible_link", "link", link)?, "mass", number);
-        }
-        ParameterLocation::Mass { link, flexible: false } => {
-            set(entry_of(file, "inertial", "link", link)?, "mass", number);
-        }
-        ParameterLocation::Com { link, axis, com } => {
-            let entry = entry_of(file, "inertial", "link", link)?;
-            if entry.get("com").is_none() {
-                entry.insert("com", toml_edit::value(com.iter().copied().collect::<Array>()));
-            }
-            put_number(entry.get_mut("com")?, Some(*axis), found)?;
-        }
+        ParameterLocation::LinkEntry { row, column, K, .. } => put_entry(link, (*row, *column), K, number)?,
+        ParameterLocation::Mass { .. } => set(link, "mass", number),
+        _ => return None,
     }
     Some(())
 }
@@ -321,14 +344,14 @@ fn entry_of<'a>(file: &'a mut DocumentMut, list: &str, key: &str, name: &str) ->
     named(file, list, key, name)
 }
 
-/// Replaces a number and keeps the spaces and comments around it.
-fn replace(old: &mut Value, number: f64) {
+/// Replaces a value and keeps the spaces and comments around it.
+fn replace(old: &mut Value, new: impl Into<Value>) {
     let decor = old.decor().clone();
-    *old = Value::from(number);
+    *old = new.into();
     *old.decor_mut() = decor;
 }
 
-/// Rewrites the relative paths of a file for another folder.
+/// Rewrites the relative paths of a robot file in the folder `home` for the folder `to`.
 pub fn moved_paths(file: &mut DocumentMut, home: &Path, to: &Path) {
     let moved = |text: &str| -> Option<String> {
         let path = Path::new(text);
@@ -337,9 +360,7 @@ pub fn moved_paths(file: &mut DocumentMut, home: &Path, to: &Path) {
     let change = |item: Option<&mut Item>| {
         let Some(value) = item.and_then(Item::as_value_mut) else { return };
         if let Some(new) = value.as_str().and_then(moved) {
-            let decor = value.decor().clone();
-            *value = Value::from(new);
-            *value.decor_mut() = decor;
+            replace(value, new);
         }
     };
     change(file.get_mut("urdf"));

@@ -3,7 +3,12 @@
 //!
 //! Start at [`read_functions`]. It reads frequency responses (function type 4) and skips other
 //! functions and other datasets.
+//!
+//! Not here: units of the values and nodes of the arm ([`crate::response_file`]).
 
+use std::path::Path;
+
+use flexarm_files::TextFileError;
 use nalgebra::Complex;
 
 /// Maximum number of values of a function.
@@ -34,8 +39,14 @@ pub struct UffFunction {
 }
 
 /// Reads all frequency responses of a file.
-pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
-    let mut reader = Lines { bytes, at: 0, line: 0 };
+///
+/// * `path`: of the file, for messages.
+///
+/// # Errors
+/// [`TextFileError`] with the line: no dataset, no frequency response, a header or a value that is not
+/// of the format, a file that ends early.
+pub fn read_functions(path: &Path, bytes: &[u8]) -> Result<Vec<UffFunction>, TextFileError> {
+    let mut reader = Lines { path, bytes, at: 0, line: 0 };
     let (mut found, mut per_si, mut sets) = (Vec::new(), None, 0);
     while let Some(line) = reader.next() {
         if line.trim() != "-1" {
@@ -50,10 +61,8 @@ pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
             Some("58b") => {
                 let numbers: Vec<&str> = words.collect();
                 let binary = Binary::of(&numbers).ok_or_else(|| {
-                    format!(
-                        "line {start}: expected `58b`, byte order (1 or 2), number format (2), lines and bytes; found \
-                         {kind:?}"
-                    )
+                    let expected = "`58b`, byte order (1 or 2), number format (2), lines and bytes";
+                    reader.unexpected(expected, kind.clone())
                 })?;
                 found.extend(function(&mut reader, start, Some(binary), per_si)?);
             }
@@ -68,16 +77,19 @@ pub fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, String> {
         }
     }
     match (sets, found.is_empty()) {
-        (0, _) => Err("this is not a universal file: it has no dataset between lines of -1".into()),
-        (_, true) => Err("the file has no frequency response (dataset 58 with function type 4)".into()),
+        (0, _) => Err(reader.error(1, "this is not a universal file: it has no dataset between lines of -1")),
+        (_, true) => Err(reader.error(1, "the file has no frequency response (dataset 58 with function type 4)")),
         _ => Ok(found),
     }
 }
 
 /// Lines of text, with binary data possibly in between.
 struct Lines<'a> {
+    path: &'a Path,
     bytes: &'a [u8],
+    /// Bytes read.
     at: usize,
+    /// Lines read.
     line: usize,
 }
 
@@ -92,14 +104,18 @@ impl Lines<'_> {
         )
     }
 
-    fn expect(&mut self, expected: &'static str) -> Result<String, String> {
+    fn expect(&mut self, expected: &'static str) -> Result<String, TextFileError> {
         let line = self.line + 1;
-        self.next().ok_or_else(|| format!("line {line}: the file ends, expected {expected}"))
+        self.next().ok_or_else(|| self.error(line, format!("the file ends, expected {expected}")))
+    }
+
+    fn error(&self, line: usize, message: impl Into<String>) -> TextFileError {
+        TextFileError { path: self.path.to_owned(), line, column: 1, message: message.into(), page: "measurements" }
     }
 
     /// Returns the error for the line read last, or for a word of it.
-    fn unexpected(&self, expected: &'static str, found: String) -> String {
-        format!("line {}: expected {expected}, found {found:?}", self.line)
+    fn unexpected(&self, expected: &'static str, found: String) -> TextFileError {
+        self.error(self.line, format!("expected {expected}, found {found:?}"))
     }
 }
 
@@ -119,7 +135,7 @@ impl Binary {
 }
 
 /// Reads the factors from SI to the units of the file: length, force.
-fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], String> {
+fn units(reader: &mut Lines<'_>) -> Result<[f64; 2], TextFileError> {
     reader.expect("the code of the units")?;
     let line = reader.expect("factors of the units")?;
     let factors: Option<Vec<f64>> = line.split_whitespace().map(number).collect();
@@ -151,7 +167,7 @@ struct ValueForm {
 }
 
 impl ValueForm {
-    fn read(reader: &mut Lines<'_>) -> Result<Self, String> {
+    fn read(reader: &mut Lines<'_>) -> Result<Self, TextFileError> {
         let text = reader.expect("form of the values")?;
         let line = reader.line;
         let words: Vec<Option<f64>> = text.split_whitespace().map(number).collect();
@@ -162,7 +178,8 @@ impl ValueForm {
             return Err(reader.unexpected("form, number and spacing of the values", text));
         };
         if !(0.0..=MAX as f64).contains(&count) || count.fract() != 0.0 {
-            return Err(format!("line {line}: the number of values is {count}, expected a whole number up to {MAX}"));
+            let text = format!("the number of values is {count}, expected a whole number up to {MAX}");
+            return Err(reader.error(line, text));
         }
         let even = (spacing == 1.0).then_some((first, step));
         Ok(Self { line, code: form as i64, count: count as usize, even })
@@ -182,12 +199,16 @@ impl ValueForm {
     }
 }
 
+/// Reads the dataset of a function after its first line; `None` if it is no frequency response.
+///
+/// * `start`: line of the dataset; `binary`: format of its values if they are binary.
 fn function(
     reader: &mut Lines<'_>,
     start: usize,
     binary: Option<Binary>,
     per_si: Option<[f64; 2]>,
-) -> Result<Option<UffFunction>, String> {
+) -> Result<Option<UffFunction>, TextFileError> {
+    // Records 1 to 5 are names; record 6 has the type of the function and the two nodes in columns.
     for _ in 0..5 {
         reader.expect("the name of a function")?;
     }
@@ -197,6 +218,7 @@ fn function(
     let (Some(kind), Some(node), Some(direction), Some(other), Some(other_direction)) = fields else {
         return Err(reader.unexpected("kind, nodes and directions in their columns", line));
     };
+    // Record 7 is the form of the values; records 8 to 11 describe the axes.
     let form = ValueForm::read(reader)?;
     reader.expect("the abscissa")?;
     let line = reader.expect("the ordinate")?;
@@ -206,12 +228,13 @@ fn function(
     reader.expect("the third axis")?;
     if !matches!(form.code, 2 | 4 | 5 | 6) {
         let ValueForm { line, code, .. } = form;
-        return Err(format!("line {line}: form {code} of values is not known; use 2, 4, 5 or 6"));
+        return Err(reader.error(line, format!("form {code} of values is not known; use 2, 4, 5 or 6")));
     }
     let numbers = match binary {
         Some(binary) => bytes_to_numbers(reader, &binary, &form)?,
         None => text_to_numbers(reader, &form)?,
     };
+    // The values of other functions are read too: the next dataset starts behind them.
     if kind != RESPONSE || !form.is_complex() {
         return Ok(None);
     }
@@ -221,20 +244,22 @@ fn function(
     };
     let values: Vec<(f64, Complex<f64>)> = numbers.chunks_exact(form.per_value()).enumerate().map(value).collect();
     if values.iter().any(|(hz, H)| !(hz.is_finite() && H.re.is_finite() && H.im.is_finite())) {
-        return Err(format!("line {start}: a value of this function is not finite"));
+        return Err(reader.error(start, "a value of this function is not finite"));
     }
     let (response, reference) = ((node, direction), (other, other_direction));
     Ok(Some(UffFunction { line: start, response, reference, ordinate, unit, per_si, values }))
 }
 
-fn text_to_numbers(reader: &mut Lines<'_>, form: &ValueForm) -> Result<Vec<f64>, String> {
+/// Reads the numbers of a function as text.
+fn text_to_numbers(reader: &mut Lines<'_>, form: &ValueForm) -> Result<Vec<f64>, TextFileError> {
     let wanted = form.count * form.per_value();
     let mut numbers = Vec::new();
     while numbers.len() < wanted {
         let line = reader.expect("a value")?;
         if line.trim() == "-1" {
-            let (line, found, head) = (reader.line, numbers.len(), form.line);
-            return Err(format!("line {line}: found {found} of the {wanted} values announced in line {head}"));
+            let (found, head) = (numbers.len(), form.line);
+            let text = format!("found {found} of the {wanted} values announced in line {head}");
+            return Err(reader.error(reader.line, text));
         }
         for word in fields(&line) {
             numbers.push(number(&word).ok_or_else(|| reader.unexpected("a number", word))?);
@@ -264,15 +289,16 @@ fn fields(line: &str) -> Vec<String> {
     words
 }
 
-fn bytes_to_numbers(reader: &mut Lines<'_>, binary: &Binary, form: &ValueForm) -> Result<Vec<f64>, String> {
+/// Reads the numbers of a function as IEEE 754 bytes.
+fn bytes_to_numbers(reader: &mut Lines<'_>, binary: &Binary, form: &ValueForm) -> Result<Vec<f64>, TextFileError> {
     let wanted = form.count * form.per_value();
     let size = if form.is_double() { 8 } else { 4 };
     let bytes = reader.bytes.get(reader.at..).unwrap_or_default();
     if binary.bytes != wanted * size || bytes.len() < binary.bytes {
         let (line, dataset, file) = (form.line, binary.bytes, bytes.len());
-        return Err(format!(
-            "line {line}: {wanted} numbers of {size} bytes are announced; the dataset has {dataset} bytes, the file {file}"
-        ));
+        let text =
+            format!("{wanted} numbers of {size} bytes are announced; the dataset has {dataset} bytes, the file {file}");
+        return Err(reader.error(line, text));
     }
     let value = |chunk: &[u8]| {
         let mut own = [0u8; 8];

@@ -1,11 +1,11 @@
 //! Checks of measurements against the nominal arm: modes and units.
 
-use crate::estimation::{Form, MeasuredArm, MeasuredResponse, Measurements, NominalArm, Reading, ReadingKind};
+use flexarm_run::Error;
 use nalgebra::{DVector, Vector3};
 
 use super::error::refused;
 use super::file::MeasurementInput;
-use flexarm_run::Error;
+use crate::estimation::{Form, MeasuredArm, MeasuredResponse, Measurements, NominalArm, Reading, ReadingKind};
 
 /// Ratio of measured to predicted size above which wrong units are the only plausible cause.
 const UNIT_RATIO: f64 = 100.0;

@@ -35,7 +35,7 @@ fn springs_of_coupled_motors_are_found_from_all_encoders_and_from_the_last_one_a
         for (gear, truth) in found.iter().zip(STIFFNESS) {
             let error = (gear.stiffness / truth - 1.0).abs();
             // Measured: at most 1e-12.
-            assert!(error < 1e-9 && gear.is_told() && gear.r2 > 1.0 - 1e-12, "{gear:?}");
+            assert!(error < 1e-9 && gear.is_determined() && gear.r2 > 1.0 - 1e-12, "{gear:?}");
         }
     }
     // Without noise the delays are exact too; the first spring's largest contribution is in its

@@ -44,14 +44,14 @@ fn a_gear_is_found_with_its_delay_whatever_the_offsets_of_the_runs() {
     let runs: Vec<Vec<GearOutput>> = [0.0, 1.0, 2.0].map(|seed| run(seed, 0.0, 8e6)).to_vec();
     let found = &gear_stiffness(&runs).unwrap()[0];
     assert!((found.stiffness / 8e6 - 1.0).abs() < 1e-10 && (found.delay_s - 3e-3).abs() < 1e-12, "{found:?}");
-    assert!(found.is_told() && found.r2 > 1.0 - 1e-12 && found.unseen_r2.iter().all(|r2| *r2 > 1.0 - 1e-12));
+    assert!(found.is_determined() && found.r2 > 1.0 - 1e-12 && found.unseen_r2.iter().all(|r2| *r2 > 1.0 - 1e-12));
     // A single run is cross-validated by its halves.
-    assert!(gear_stiffness(&runs[..1]).unwrap()[0].is_told());
+    assert!(gear_stiffness(&runs[..1]).unwrap()[0].is_determined());
 }
 
 #[test]
 fn a_deflection_below_the_error_of_the_encoder_is_not_told() {
     let runs: Vec<Vec<GearOutput>> = [0.0, 1.0, 2.0].map(|seed| run(seed, 4e-4, 4e7)).to_vec();
     let found = &gear_stiffness(&runs).unwrap()[0];
-    assert!(!found.is_told(), "{found:?}");
+    assert!(!found.is_determined(), "{found:?}");
 }

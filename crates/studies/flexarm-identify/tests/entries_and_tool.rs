@@ -92,8 +92,8 @@ fn measurements(nominal: &NominalArm) -> Measurements {
     let heavy = LoadCase { carried, ..LoadCase::none() };
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
     let mut rows: Vec<Row<Component>> =
-        axes.iter().map(|d| Row { of: Component::Along(*d), value: 1e-3, std: 1e-4 }).collect();
-    rows.extend(axes.iter().map(|d| Row { of: Component::About(*d), value: 1e-3, std: 1e-4 }));
+        axes.iter().map(|d| Row { of: Component::along(*d), value: 1e-3, std: 1e-4 }).collect();
+    rows.extend(axes.iter().map(|d| Row { of: Component::about(*d), value: 1e-3, std: 1e-4 }));
     let probe = |place: [f64; 3], direction| {
         let X = Pose::translation(place[0], place[1], place[2]);
         let frame = nominal.tool.clone();
@@ -193,7 +193,7 @@ fn the_compliance_changes_with_an_entry_as_differences_say() {
     let parameters = &parameters(&nominal)[..3];
     let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::zeros());
     let solved = |nominal: &NominalArm| {
-        let mut at = OperatingPoint::new(nominal.held(&POSE).unwrap(), nominal.tool.clone());
+        let mut at = OperatingPoint::new(nominal.locked(&POSE).unwrap(), nominal.tool.clone());
         at.solve(&POSE, &load).unwrap();
         at
     };
@@ -217,7 +217,7 @@ fn pulls(count: usize) -> Measurements {
         let at = Vector3::new(0.2, 0.1, 0.0);
         let after = LoadCase { wrench: Wrench::new(force, Vector3::zeros()), at, ..LoadCase::none() };
         let rows = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let of = [Component::Along, Component::About];
+        let of = [Component::along, Component::about];
         let rows = of.iter().flat_map(|of| rows.map(|d| Row { of: of(d), value: 0.0, std: 1e-5 })).collect();
         let kind = ReadingKind::Displacement { before: LoadCase::none(), after, point: at, rows };
         Reading { name: format!("pull {k}"), q, kind }

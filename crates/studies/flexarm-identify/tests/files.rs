@@ -70,7 +70,7 @@ impl Place {
                     before: LoadCase::none(),
                     after: load.clone(),
                     point: Vector3::new(0.4, 0.0, 0.0),
-                    rows: axes.map(|d| Row { of: Component::Along(d), value: 0.0, std: NOISE }).to_vec(),
+                    rows: axes.map(|d| Row { of: Component::along(d), value: 0.0, std: NOISE }).to_vec(),
                 },
                 Some(_) => ReadingKind::Place {
                     load: load.clone(),

@@ -62,7 +62,7 @@ fn pulled(draw: &mut Draw, count: usize) -> Measurements {
         }
         let wrench = Wrench::new(force, Vector3::zeros());
         let rows = [Vector3::x(), Vector3::y(), Vector3::z()];
-        let rows = rows.map(|d| Row { of: Component::Along(d), value: 0.0, std: NOISE }).to_vec();
+        let rows = rows.map(|d| Row { of: Component::along(d), value: 0.0, std: NOISE }).to_vec();
         let kind = ReadingKind::Displacement {
             before: LoadCase::none(),
             after: LoadCase { wrench, at: Vector3::new(0.1, 0.4, 0.0), ..LoadCase::none() },
@@ -148,7 +148,7 @@ fn a_dial_gauge_under_one_weight_tells_one_combination_and_the_rest_stays_where_
     let found = fit(&nominal, &parameters, &noisy, &IdentifyOptions::default());
     // In the plane of the arm only bending about y has an effect, combined over both links: one
     // direction of six is known better than before.
-    assert_eq!(found.untold.len(), 5, "{:?}", found.untold);
+    assert_eq!(found.undetermined.len(), 5, "{:?}", found.undetermined);
     for parameter in &found.parameters {
         assert!(!parameter.identifiable && parameter.std.is_nan(), "{parameter:?}");
     }
@@ -191,7 +191,7 @@ fn a_tracker_that_stands_anywhere_and_a_target_that_is_not_known_come_out_with_t
         readings,
         targets: vec![Target::Known(target)],
         instruments: vec![Instrument::Known(X)],
-        links: Vec::new(),
+        ..Measurements::default()
     };
     let mut noisy = read(&nominal, &parameters, &TRUTH, &known, &mut draw);
     noisy.instruments = vec![Instrument::Unknown(Pose::identity())];
@@ -331,7 +331,7 @@ fn displacements_in_the_axes_of_an_instrument_tell_stiffness_and_axes() {
     let R = Rotation3::from_euler_angles(0.4, -0.9, 2.2);
     for reading in &mut seen.readings {
         let ReadingKind::Displacement { rows, .. } = &mut reading.kind else { continue };
-        rows.iter_mut().for_each(|row| row.of = Component::AlongSeen(0, row.of.parts().0));
+        rows.iter_mut().for_each(|row| row.of.instrument = Some(0));
     }
     seen.instruments = vec![Instrument::Known(Pose::from_parts(Translation3::new(9.0, 9.0, 9.0), R))];
     let mut noisy = read(&nominal, &parameters, &TRUTH, &seen, &mut draw);
@@ -461,7 +461,7 @@ fn a_fit_that_does_not_meet_the_readings_has_deviations_that_include_the_error_o
 
 /// Truth: the simulated arm, of which one spring is rigid.
 #[test]
-fn a_rigid_spring_is_told_from_one_that_nobody_measured() {
+fn a_rigid_spring_is_determined_from_one_that_nobody_measured() {
     let (nominal, parameters) = (nominal(), parameters());
     let mut truth = TRUTH;
     truth[1] = 12.0;

@@ -51,7 +51,7 @@ fn pulls() -> Measurements {
         let at = Vector3::new(0.4, 0.1, 0.0);
         let after = LoadCase { wrench: Wrench::new(force, Vector3::zeros()), at, ..LoadCase::none() };
         let rows =
-            [Vector3::x(), Vector3::y(), Vector3::z()].map(|d| Row { of: Component::Along(d), value: 0.0, std: 3e-5 });
+            [Vector3::x(), Vector3::y(), Vector3::z()].map(|d| Row { of: Component::along(d), value: 0.0, std: 3e-5 });
         let kind = ReadingKind::Displacement { before: LoadCase::none(), after, point: at, rows: rows.to_vec() };
         Reading { name: format!("pull {k}"), q: (0..6).map(angle).collect(), kind }
     });

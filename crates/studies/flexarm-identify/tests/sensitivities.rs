@@ -84,7 +84,7 @@ fn the_tool_moves_with_each_parameter_as_the_nonlinear_equilibrium_does() {
         // With a constant moment the tangent is not symmetric.
         let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(moment, -moment, 0.5 * moment));
         let solved = |nominal: &NominalArm| {
-            let mut at = OperatingPoint::new(nominal.held(&POSE).unwrap(), nominal.tool.clone());
+            let mut at = OperatingPoint::new(nominal.locked(&POSE).unwrap(), nominal.tool.clone());
             at.solve(&POSE, &load).unwrap();
             at
         };
@@ -135,12 +135,12 @@ fn every_row_of_every_kind_of_reading_has_the_derivatives_of_its_residual() {
     let heavy = LoadCase { carried, ..LoadCase::none() };
     let axes = [Vector3::x(), Vector3::y(), Vector3::z(), Vector3::new(0.6, 0.0, 0.8)];
     let mut rows: Vec<Row<Component>> =
-        axes.iter().map(|d| Row { of: Component::Along(*d), value: 1e-3, std: 1e-4 }).collect();
-    rows.extend(axes.iter().map(|d| Row { of: Component::About(*d), value: 1e-3, std: 1e-4 }));
+        axes.iter().map(|d| Row { of: Component::along(*d), value: 1e-3, std: 1e-4 }).collect();
+    rows.extend(axes.iter().map(|d| Row { of: Component::about(*d), value: 1e-3, std: 1e-4 }));
     for instrument in [0, 1] {
-        let seen =
-            axes.iter().flat_map(|d| [Component::AlongSeen(instrument, *d), Component::AboutSeen(instrument, *d)]);
-        rows.extend(seen.map(|of| Row { of, value: 1e-3, std: 1e-4 }));
+        let components = axes.iter().flat_map(|d| [Component::along(*d), Component::about(*d)]);
+        let in_axes = components.map(|of| Component { instrument: Some(instrument), ..of });
+        rows.extend(in_axes.map(|of| Row { of, value: 1e-3, std: 1e-4 }));
     }
     let point = Vector3::new(-0.1, 0.2, 0.3);
     let moved = |before: &LoadCase, after: &LoadCase| ReadingKind::Displacement {
@@ -205,7 +205,7 @@ fn a_response_is_that_of_the_linearised_arm() {
     let mut nominal = nominal();
     with_damping(&mut nominal);
     let probes = probes(&nominal);
-    let arm = nominal.held(&POSE).unwrap();
+    let arm = nominal.locked(&POSE).unwrap();
     let at = |probe: &Probe| flexarm_stepping::linearise(&arm, &probe.frame, &Wrench::zeros(), 0.0).unwrap();
     let (watched, hit) = (at(&probes[0]), at(&probes[1]));
     let row = |J: &nalgebra::Matrix6xX<f64>, d: &Vector3<f64>| {
@@ -293,7 +293,7 @@ fn the_compliance_changes_with_each_parameter_as_differences_say() {
     for moment in [0.0, 60.0] {
         let load = Wrench::new(Vector3::new(90.0, 50.0, -200.0), Vector3::new(moment, -moment, 0.5 * moment));
         let solved = |nominal: &NominalArm| {
-            let mut at = OperatingPoint::new(nominal.held(&POSE).unwrap(), nominal.tool.clone());
+            let mut at = OperatingPoint::new(nominal.locked(&POSE).unwrap(), nominal.tool.clone());
             at.solve(&POSE, &load).unwrap();
             at
         };

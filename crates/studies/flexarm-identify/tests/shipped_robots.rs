@@ -49,7 +49,7 @@ fn pulls(draw: &mut Draw, count: usize) -> Measurements {
             after: LoadCase { wrench, at: Vector3::new(0.4, 0.0, 0.0), ..LoadCase::none() },
             // Off the axis of the last joint, which would otherwise be unobservable.
             point: Vector3::new(0.4, 0.0, 0.0),
-            rows: rows.map(|d| Row { of: Component::Along(d), value: 0.0, std: NOISE }).to_vec(),
+            rows: rows.map(|d| Row { of: Component::along(d), value: 0.0, std: NOISE }).to_vec(),
         };
         Reading { name: format!("pull {k}"), q: q.iter().zip(middle).map(|(a, b)| a + b).collect(), kind }
     });
@@ -232,7 +232,7 @@ fn a_plan_tells_more_than_as_many_poses_as_they_come_and_its_table_is_read_when_
     let job = folder.join("measurements.toml");
     // Not filled in yet.
     let error = identify_robot(&robot, &job, &IdentifyRequest::default()).unwrap_err().to_string();
-    assert!(error.contains("displacements.csv line 2: there is no measured value"), "{error}");
+    assert!(error.contains("displacements.csv:2:1: displacements.csv:2: there is no measured value"), "{error}");
     let empty = std::fs::read_to_string(folder.join("displacements.csv")).unwrap();
     let mut lines = empty.lines();
     let mut filled = lines.next().unwrap().to_owned() + "\n";

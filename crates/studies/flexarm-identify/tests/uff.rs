@@ -1,7 +1,14 @@
 //! Universal files of modal tests.
 
-use flexarm_identify::internals::read_functions;
+use std::path::Path;
+
+use flexarm_files::TextFileError;
+use flexarm_identify::internals::UffFunction;
 use nalgebra::Complex;
+
+fn read_functions(bytes: &[u8]) -> Result<Vec<UffFunction>, TextFileError> {
+    flexarm_identify::internals::read_functions(Path::new("hammer.uff"), bytes)
+}
 
 /// Writes a function with three values at equal spacing; `values` follows the header.
 fn dataset(kind: &str, form: i64, spacing: i64, values: &[u8]) -> Vec<u8> {
@@ -50,12 +57,24 @@ fn a_function_is_the_same_as_text_and_in_both_orders_of_bytes() {
             assert!((hz - f).abs() < 1e-12 && (H - truth).norm() <= within * 5.0, "{kind}: {hz} {H}");
         }
     }
-    let cut = dataset(&head(1, 96), 6, 1, &little);
-    assert!(read_functions(&cut).unwrap_err().to_string().contains("announced"));
-    let short = dataset("58", 5, 1, b"  1.5 2.5");
-    assert!(read_functions(&short).unwrap_err().to_string().contains("2 of the 6 values"));
-    assert!(read_functions(b"solid x").unwrap_err().to_string().contains("not a universal file"));
-    assert!(read_functions(b"    -1\n    151\nx\n    -1\n").unwrap_err().to_string().contains("no frequency response"));
+}
+
+/// What is wrong has the line of the file: of the form, of a word, or of the end.
+#[test]
+fn a_broken_file_is_refused_with_its_line() {
+    let head = "58b     1     2          11            96     0     0           0           0";
+    let cases: [(Vec<u8>, &str); 6] = [
+        (dataset(head, 6, 1, &[0; 48]), "hammer.uff:9:1: 6 numbers of 8 bytes are announced"),
+        (dataset("58", 5, 1, b"  1.5 2.5"), "hammer.uff:15:1: found 2 of the 6 values announced in line 9"),
+        (dataset("58", 5, 1, b"  1.5 2.5\n 1.0 x"), "hammer.uff:15:1: expected a number, found \"x\""),
+        (dataset("58b 3 2 11 24", 5, 1, b""), "hammer.uff:2:1: expected `58b`"),
+        (b"solid x".to_vec(), "hammer.uff:1:1: this is not a universal file"),
+        (b"    -1\n    151\nx\n    -1\n".to_vec(), "hammer.uff:1:1: the file has no frequency response"),
+    ];
+    for (bytes, expected) in cases {
+        let error = read_functions(&bytes).unwrap_err().to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
 }
 
 #[test]

@@ -1249,7 +1249,7 @@ class EncoderFigures(TypedDict):
     noise_rms: float
     """RMS of the noise of both encoders below the cut-off frequency, extrapolated from the noise at higher frequencies (rad, m)."""
     told: bool
-    """Whether the recordings determine the stiffness (GearEstimate::is_told)."""
+    """Whether the recordings determine the stiffness (GearEstimate::is_determined)."""
 
 
 class Suspicious(TypedDict):

@@ -62,7 +62,7 @@ impl GearEstimate {
     /// Whether the recordings determine the stiffness: the median R² of unseen runs is above 0.3,
     /// no single run changes the logarithm of the stiffness by 0.5 or more, and [`Self::std_ln`] is
     /// below 0.5.
-    pub fn is_told(&self) -> bool {
+    pub fn is_determined(&self) -> bool {
         let sound = |x: &f64| x.is_finite() && *x > 0.0;
         let mut unseen = self.unseen_r2.clone();
         unseen.sort_by(f64::total_cmp);
@@ -111,7 +111,7 @@ pub fn gear_stiffness(runs: &[Vec<GearOutput>]) -> Option<Vec<GearEstimate>> {
         GearEstimate {
             stiffness: 1.0 / compliance,
             std_ln: scatter(&left).max(scatter(&without)) / compliance.abs(),
-            delay_s: fit.delay[seen_most(runs, motor)],
+            delay_s: fit.delay[main_output(runs, motor)],
             r2: 1.0 - sums.0 / sums.1,
             unseen_r2: unseen.map(|(rest, whole)| 1.0 - rest / whole).collect(),
             without_each: without.iter().map(|fit| 1.0 / fit.compliance[motor]).collect(),
@@ -124,7 +124,7 @@ pub fn gear_stiffness(runs: &[Vec<GearOutput>]) -> Option<Vec<GearEstimate>> {
 }
 
 /// Returns the encoder with the largest contribution of a spring.
-fn seen_most(runs: &[Vec<GearOutput>], motor: usize) -> usize {
+fn main_output(runs: &[Vec<GearOutput>], motor: usize) -> usize {
     let size = |output: usize| {
         runs.iter().flat_map(|run| &run[output].torques[motor]).map(|torque| torque * torque).sum::<f64>()
     };

@@ -61,7 +61,7 @@ pub struct Identified {
     /// Correlation matrix of the parameters' coordinates, p×p.
     pub correlation: DMatrix<f64>,
     /// Combinations that the readings do not determine: parameter and weight, largest weight first.
-    pub untold: Vec<Vec<(usize, f64)>>,
+    pub undetermined: Vec<Vec<(usize, f64)>>,
     /// Parameters that these combinations connect; alone: a parameter that the readings do not
     /// determine.
     pub together: Vec<Vec<usize>>,

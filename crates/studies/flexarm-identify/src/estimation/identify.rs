@@ -251,10 +251,11 @@ impl Fit<'_> {
                 None => skipped += 1,
             }
         }
-        let seen: Vec<usize> = (0..residuals.len()).filter(|k| residuals[*k].is_finite()).collect();
-        let square = |values: &[f64]| seen.iter().map(|k| (values[*k] / solution.deviations[*k]).powi(2)).sum::<f64>();
-        let rms = |values: &[f64]| (square(values) / seen.len() as f64).sqrt();
-        (!seen.is_empty()).then(|| HeldOut {
+        let predicted: Vec<usize> = (0..residuals.len()).filter(|k| residuals[*k].is_finite()).collect();
+        let square =
+            |values: &[f64]| predicted.iter().map(|k| (values[*k] / solution.deviations[*k]).powi(2)).sum::<f64>();
+        let rms = |values: &[f64]| (square(values) / predicted.len() as f64).sqrt();
+        (!predicted.is_empty()).then(|| HeldOut {
             folds,
             skipped,
             rms: rms(&residuals),
@@ -280,12 +281,12 @@ impl Fit<'_> {
         let estimate = |(k, parameter): (usize, &Parameter)| {
             estimate(parameter, &unknowns[k], solution.unknowns[k], C[(k, k)].sqrt())
         };
-        let (untold, together) = untold(unknowns, C, p);
+        let (undetermined, together) = undetermined(unknowns, C, p);
         let errors = solution.model_errors.iter().enumerate().filter(|(_, error)| **error > 0.0);
         Identified {
             parameters: parameters.iter().enumerate().map(estimate).collect(),
             correlation,
-            untold,
+            undetermined,
             together,
             normalised,
             suspicious,
@@ -316,8 +317,10 @@ fn own_name(measurements: &Measurements, number: usize) -> String {
         first += instrument.unknowns();
         if number < first {
             return match instrument {
-                Instrument::Axes(_) => format!("the orientation of instrument {k} in the world"),
-                _ => format!("the pose of instrument {k} in the world"),
+                Instrument::Axes(_) => {
+                    format!("the orientation of instrument {} in the world", measurements.instrument_name(k))
+                }
+                _ => format!("the pose of instrument {} in the world", measurements.instrument_name(k)),
             };
         }
     }
@@ -359,7 +362,7 @@ type Combination = Vec<(usize, f64)>;
 /// Returns the directions of the parameters, over their prior deviations, of which the readings
 /// know no more than the prior, as parameters and weights, largest weight first, and the groups of
 /// parameters that these directions connect.
-fn untold(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> (Vec<Combination>, Vec<Vec<usize>>) {
+fn undetermined(unknowns: &[Unknown], C: &DMatrix<f64>, p: usize) -> (Vec<Combination>, Vec<Vec<usize>>) {
     let std: Vec<f64> = unknowns[..p].iter().map(|unknown| unknown.prior.map_or(1.0, |(_, std)| std)).collect();
     let over = DMatrix::from_fn(p, p, |i, j| C[(i, j)] / (std[i] * std[j]));
     let eigen = SymmetricEigen::new(over);

@@ -362,8 +362,8 @@ impl<P: Residuals> Fit<'_, P> {
     fn cost(&self, r: &DVector<f64>, x: &DVector<f64>) -> f64 {
         let prior =
             |(unknown, x): (&Unknown, &f64)| unknown.prior.map_or(0.0, |(mean, std)| ((x - mean) / std).powi(2));
-        let held: f64 = self.unknowns.iter().zip(x.iter()).map(prior).sum();
-        r.iter().zip(self.s.iter()).map(|(r, s)| self.search.loss.cost(r / s)).sum::<f64>() + held
+        let priors: f64 = self.unknowns.iter().zip(x.iter()).map(prior).sum();
+        r.iter().zip(self.s.iter()).map(|(r, s)| self.search.loss.cost(r / s)).sum::<f64>() + priors
     }
 
     /// Increases the damping until a step does not increase the cost. Returns whether there is one,

@@ -1,15 +1,19 @@
 //! Residuals: readings predicted by an arm with given parameters against measured ones.
 //!
-//! A reading is one measurement at the robot: a displacement between two loads at a pose, a
-//! position in the axes of an instrument, the natural frequencies from a hammer test. Each gives
-//! rows: residual over standard deviation, and its derivatives with respect to the parameters and
-//! to the unknowns of the measurement (pose of the instrument, position of the target on the tool).
+//! Start at [`MeasuredArm`]. Each reading gives rows, predicted minus measured, and their derivatives with
+//! respect to the parameters and to the unknowns of the measurement (pose of the instrument, position of
+//! the target). Readings under one load share an operating point ([`Workspaces`]).
+//!
+//! Frames: W world, T tool, I instrument, F frame of a target; vectors in world axes unless named.
+//! Not here: derivatives of the arm itself ([`super::sensitivity`], [`super::response`]).
 
 use std::borrow::Cow;
 
 use flexarm_kinematics::{ElasticAngles, Frame, Pose, SpatialInertia, Wrench, rotation_vector};
 use flexarm_stepping::{OperatingPoint, StepError};
-use nalgebra::{DMatrix, DVector, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3, Vector6};
+use nalgebra::{
+    DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Rotation3, RowDVector, Translation3, Vector3, Vector6,
+};
 
 use crate::estimation::least_squares::Residuals;
 use crate::estimation::parameter::{
@@ -55,23 +59,25 @@ struct AtRest {
 }
 
 impl AtRest {
+    /// Returns a point of the frame in the world.
     fn point(&self, p_F: &Vector3<f64>) -> Vector3<f64> {
         self.X_WF.translation.vector + self.X_WF.rotation * p_F
     }
 
-    /// Returns the angular velocities.
+    /// Returns the angular velocities, world axes.
     fn turns(&self) -> Option<Matrix3xX<f64>> {
         self.slopes.as_ref().map(|slopes| slopes.fixed_rows::<3>(3).into_owned())
     }
 
+    /// Returns the velocities of a point of the frame, `v + w × R p_F`.
     fn point_slopes(&self, p_F: &Vector3<f64>) -> Option<Matrix3xX<f64>> {
-        let arm = self.X_WF.rotation * p_F;
+        let p_W = self.X_WF.rotation * p_F;
         let (slopes, turns) = (self.slopes.as_ref()?, self.turns()?);
-        let mut moved = slopes.fixed_rows::<3>(0).into_owned();
-        for (mut to, w) in moved.column_iter_mut().zip(turns.column_iter()) {
-            to += w.cross(&arm);
+        let mut velocities = slopes.fixed_rows::<3>(0).into_owned();
+        for (mut v, w) in velocities.column_iter_mut().zip(turns.column_iter()) {
+            v += w.cross(&p_W);
         }
-        Some(moved)
+        Some(velocities)
     }
 }
 
@@ -154,6 +160,7 @@ impl<'a> Workspaces<'a> {
     /// moves that mass. Twists of joint frames are in the axes after all displacements; masses and
     /// centres of mass of links are linearised at their present values.
     fn under(&self, carried: &SpatialInertia) -> Cow<'a, [Parameter]> {
+        // The parameters serve as they are if none depends on the values of others or on the load.
         let depends = |p: &Parameter| matches!(p.effect, Effect::Tool(_) | Effect::Frame { .. } | Effect::Link { .. });
         if !self.parameters.iter().any(depends) {
             return Cow::Borrowed(self.parameters);
@@ -174,6 +181,7 @@ impl<'a> Workspaces<'a> {
         for k in 0..all.len() {
             let (before, after) = all.split_at_mut(k);
             let (Effect::Frame { body, twist, .. }, Some(x)) = (&after[0].effect, self.x.get(k)) else { continue };
+            // Earlier displacements of the same frame are followed by this one.
             let X = displacement(&(twist * *x));
             for other in before {
                 if let Effect::Frame { body: own, twist, .. } = &mut other.effect
@@ -189,6 +197,7 @@ impl<'a> Workspaces<'a> {
         Cow::Owned(all)
     }
 
+    /// Returns the arm with a mass at its tool; inertia about the tool's origin, tool axes.
     fn loaded(&self, carried: &SpatialInertia) -> NominalArm {
         let tool = &self.nominal.tool;
         self.nominal.carrying(tool.body, &carried.at_parent(&tool.X_BF))
@@ -264,6 +273,7 @@ impl MeasuredArm<'_> {
         all
     }
 
+    /// Returns the arm at the values of the parameters, without operating points.
     fn workspaces(&self, unknowns: &DVector<f64>) -> Workspaces<'_> {
         let x = unknowns.as_slice()[..self.parameters.len()].to_vec();
         Workspaces {
@@ -346,20 +356,24 @@ impl MeasuredArm<'_> {
         DMatrix::from_fn(rows, columns, |i, j| if j < p { 0.0 } else { slope(i, j - p) })
     }
 
-    /// Returns the position of an instrument in the world if `placed`, and the rotation vector, in
-    /// the instrument's axes, by which it is turned from `X`.
+    /// Predicts prior knowledge of an instrument: its position in the world if `placed`, and the rotation
+    /// vector φ, in its axes, by which it is turned from the given pose `X`.
+    ///
+    /// ```text
+    /// R_IW Rᵀ = exp(φ),   dφ = J_l(φ)^-1 w,   dp_WI = R_WI (w × p_IW - dp_IW)
+    /// ```
+    /// with the angular velocity w in instrument axes per unknown of the rotation.
     fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
         let (X_IW, place, turn) = self.measurements.instrument(number, own);
         let X_WI = X_IW.inverse();
-        let turned = rotation_vector((X_IW.rotation * X.rotation.inverse()).matrix());
-        let seen = placed.then_some(X_WI.translation.vector);
-        let values: Vec<f64> = seen.iter().flat_map(|p| p.iter().copied()).chain(turned.iter().copied()).collect();
+        let phi = rotation_vector((X_IW.rotation * X.rotation.inverse()).matrix());
+        let p_WI = placed.then_some(X_WI.translation.vector);
+        let values: Vec<f64> = p_WI.iter().flatten().chain(&phi).copied().collect();
         let mut by_own = DMatrix::zeros(values.len(), own.len());
         let rows = values.len() - 3;
         if let Some(first) = turn {
-            let v = Vector3::new(own[first], own[first + 1], own[first + 2]);
-            let (rates, back) = (left_jacobian(&v), left_jacobian(&turned).try_inverse());
-            let back = back.unwrap_or_else(nalgebra::Matrix3::identity);
+            let rates = left_jacobian(&vector_at(own, first));
+            let back = left_jacobian(&phi).try_inverse().unwrap_or_else(Matrix3::identity);
             for k in 0..3 {
                 let w: Vector3<f64> = rates.column(k).into_owned();
                 by_own.view_mut((rows, first + k), (3, 1)).copy_from(&(back * w));
@@ -376,6 +390,7 @@ impl MeasuredArm<'_> {
         Block { values, slopes }
     }
 
+    /// Predicts the numbers of a frequency response.
     fn response(
         &self,
         workspaces: &Workspaces<'_>,
@@ -397,6 +412,7 @@ impl MeasuredArm<'_> {
         Ok(Block { values, slopes: self.with_own(2 * omega.len(), own, slopes, slope) })
     }
 
+    /// Predicts the amplitudes of the most similar mode, normalised to length 1.
     fn shape(
         &self,
         workspaces: &Workspaces<'_>,
@@ -409,35 +425,35 @@ impl MeasuredArm<'_> {
         let parameters = if slopes { workspaces.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
         let found = structure_slopes(&nominal, &parameters, q, &measured.probes)?;
         let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
-        let (mode, _, seen) = measured.likeliest(&found).ok_or_else(none)?;
-        let all = found.shape_slopes(mode);
-        let changes: Vec<DVector<f64>> = (0..parameters.len())
-            .map(|p| {
-                let raw = |shape: &DVector<f64>| {
-                    DVector::from_iterator(seen.len(), found.structure.rows.iter().map(|row| (row * shape)[0]))
-                };
-                let phi = found.shapes.column(mode).into_owned();
-                let turned = found.slopes[p].rows.iter().map(|row| (row * &phi)[0]);
-                let change = raw(&all[p]) + DVector::from_iterator(seen.len(), turned);
-                let amplitude = raw(&phi);
-                // Derivative of a vector normalised to unit length: only its part normal to the
-                // vector.
-                let sign = amplitude.dot(&seen).signum();
-                let change = change * (sign / amplitude.norm());
-                &change - &seen * seen.dot(&change)
+        let (mode, _, unit) = measured.likeliest(&found).ok_or_else(none)?;
+        let amplitudes = |rows: &[RowDVector<f64>], shape: &DVector<f64>| {
+            DVector::from_iterator(rows.len(), rows.iter().map(|row| (row * shape)[0]))
+        };
+        let phi = found.shapes.column(mode).into_owned();
+        let a = amplitudes(&found.structure.rows, &phi);
+        let sign = a.dot(&unit).signum();
+        // d(a/|a|) = (1 - u uᵀ) da / |a|: only the part normal to the unit vector u counts.
+        let changes: Vec<DVector<f64>> = found
+            .shape_slopes(mode)
+            .iter()
+            .zip(&found.slopes)
+            .map(|(dphi, slope)| {
+                let da = amplitudes(&found.structure.rows, dphi) + amplitudes(&slope.rows, &phi);
+                let change = da * (sign / a.norm());
+                &change - &unit * unit.dot(&change)
             })
             .collect();
-        let slopes = self.with_own(seen.len(), own, slopes, |i, j| changes[j][i]);
-        Ok(Block { values: seen.iter().copied().collect(), slopes })
+        let slopes = self.with_own(unit.len(), own, slopes, |i, j| changes[j][i]);
+        Ok(Block { values: unit.iter().copied().collect(), slopes })
     }
 
-    /// Predicts the position of a target as seen from an instrument.
+    /// Predicts the position of a target in the axes of an instrument, `p_I = X_IW p_W`.
     fn place(&self, at: &AtRest, target: usize, instrument: usize, own: &[f64]) -> Block {
         let p = self.parameters.len();
         let (X_IW, place, turn) = self.measurements.instrument(instrument, own);
         let (p_T, three) = self.measurements.target(target, own);
-        let seen = X_IW.rotation * at.point(&p_T);
-        let values = (seen + X_IW.translation.vector).iter().copied().collect();
+        let turned_I = X_IW.rotation * at.point(&p_T);
+        let values = (turned_I + X_IW.translation.vector).iter().copied().collect();
         let Some(moved) = at.point_slopes(&p_T) else { return Block { values, slopes: DMatrix::zeros(3, 0) } };
         let mut slopes = DMatrix::zeros(3, p + own.len());
         slopes.columns_mut(0, p).copy_from(&(X_IW.rotation * moved));
@@ -447,9 +463,9 @@ impl MeasuredArm<'_> {
         if let Some(first) = turn {
             // The unknowns are increments of a rotation vector; the left Jacobian maps their rates
             // to the angular velocity.
-            let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
+            let rates = left_jacobian(&vector_at(own, first));
             for k in 0..3 {
-                slopes.view_mut((0, p + first + k), (3, 1)).copy_from(&rates.column(k).cross(&seen));
+                slopes.view_mut((0, p + first + k), (3, 1)).copy_from(&rates.column(k).cross(&turned_I));
             }
         }
         if let Some(first) = three {
@@ -480,64 +496,71 @@ fn tool_twists<'a>(
 
 /// Returns the left Jacobian of a rotation vector: angular velocity (fixed axes) per rate of the
 /// vector.
-fn left_jacobian(v: &Vector3<f64>) -> nalgebra::Matrix3<f64> {
+fn left_jacobian(v: &Vector3<f64>) -> Matrix3<f64> {
     ElasticAngles::RotationVector.pose(v).1.transpose()
 }
 
 impl MeasuredArm<'_> {
+    /// Predicts components of the displacement of a point of the tool between two loads.
+    ///
+    /// ```text
+    /// u = p(after) - p(before),   R = R_after R_beforeᵀ = exp(φ)          value = dᵀ u or dᵀ φ
+    /// du = v_a - v_b,             dφ = J_l(φ)^-1 (w_a - R w_b)
+    /// ```
+    /// * `p_T`: the point, tool axes (m).
     #[expect(clippy::too_many_arguments, reason = "what a displacement is made of")]
     fn displacement(
         &self,
         workspaces: &mut Workspaces<'_>,
         q: &[f64],
-        loads: [&LoadCase; 2],
-        point: &Vector3<f64>,
+        [before, after]: [&LoadCase; 2],
+        p_T: &Vector3<f64>,
         rows: &[Row<Component>],
         own: &[f64],
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let before = workspaces.at_rest(q, loads[0], None, slopes)?;
-        let after = workspaces.at_rest(q, loads[1], None, slopes)?;
-        let moved = after.point(point) - before.point(point);
-        let turn = after.X_WF.rotation * before.X_WF.rotation.inverse();
-        let turned = rotation_vector(turn.matrix());
-        // Directions in world axes; directions in an instrument's axes are rotated into the world.
-        let seen_from = |instrument: Option<usize>| instrument.map(|k| self.measurements.instrument(k, own));
+        let before = workspaces.at_rest(q, before, None, slopes)?;
+        let after = workspaces.at_rest(q, after, None, slopes)?;
+        let u = after.point(p_T) - before.point(p_T);
+        let R = after.X_WF.rotation * before.X_WF.rotation.inverse();
+        let phi = rotation_vector(R.matrix());
+        // Directions in an instrument's axes are rotated into the world.
+        let instrument = |row: &Row<Component>| row.of.instrument.map(|k| self.measurements.instrument(k, own));
         let world = |row: &Row<Component>| {
-            let (d, instrument, about) = row.of.parts();
-            (seen_from(instrument).map_or(d, |(X_IW, ..)| X_IW.rotation.inverse() * d), about)
+            instrument(row).map_or(row.of.direction, |(X_IW, ..)| X_IW.rotation.inverse() * row.of.direction)
         };
-        let value = |row: &Row<Component>| match world(row) {
-            (d, false) => d.dot(&moved),
-            (d, true) => d.dot(&turned),
+        let values = rows.iter().map(|row| world(row).dot(if row.of.rotation { &phi } else { &u })).collect();
+        let (Some(v_a), Some(v_b), Some(w_a), Some(w_b)) =
+            (after.point_slopes(p_T), before.point_slopes(p_T), after.turns(), before.turns())
+        else {
+            return Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
         };
-        let values = rows.iter().map(value).collect();
-        let none = |values| Ok(Block { values, slopes: DMatrix::zeros(rows.len(), 0) });
-        let (Some(a), Some(b)) = (after.point_slopes(point), before.point_slopes(point)) else { return none(values) };
-        let (Some(wa), Some(wb)) = (after.turns(), before.turns()) else { return none(values) };
-        // The rotation from before to after has the angular velocity wa - R wb; the inverse left
-        // Jacobian maps it to the rate of the rotation vector.
-        let rate = left_jacobian(&turned).try_inverse().unwrap_or_else(nalgebra::Matrix3::identity);
-        let p = a.ncols();
+        let rate = left_jacobian(&phi).try_inverse().unwrap_or_else(Matrix3::identity);
+        let p = v_a.ncols();
         let mut all = DMatrix::zeros(rows.len(), p + own.len());
         for (i, row) in rows.iter().enumerate() {
-            let (d, about) = world(row);
+            let d = world(row);
             for k in 0..p {
-                all[(i, k)] = match about {
-                    false => d.dot(&(a.column(k) - b.column(k))),
-                    true => d.dot(&(rate * (wa.column(k) - turn * wb.column(k)))),
+                all[(i, k)] = match row.of.rotation {
+                    false => d.dot(&(v_a.column(k) - v_b.column(k))),
+                    true => d.dot(&(rate * (w_a.column(k) - R * w_b.column(k)))),
                 };
             }
-            let (d, instrument, _) = row.of.parts();
-            let Some((X_IW, _, Some(first))) = seen_from(instrument) else { continue };
-            let seen = X_IW.rotation * if about { turned } else { moved };
-            let rates = left_jacobian(&Vector3::new(own[first], own[first + 1], own[first + 2]));
+            // An instrument that turns sees the same vector in other axes.
+            let Some((X_IW, _, Some(first))) = instrument(row) else { continue };
+            let vector_I = X_IW.rotation * if row.of.rotation { phi } else { u };
+            let rates = left_jacobian(&vector_at(own, first));
             for k in 0..3 {
-                all[(i, p + first + k)] = d.dot(&rates.column(k).cross(&seen));
+                all[(i, p + first + k)] = row.of.direction.dot(&rates.column(k).cross(&vector_I));
             }
         }
         Ok(Block { values, slopes: all })
     }
+}
+
+/// Returns three unknowns as a vector.
+fn vector_at(own: &[f64], first: usize) -> Vector3<f64> {
+    Vector3::from_column_slice(&own[first..first + 3])
 }
 
 impl Residuals for MeasuredArm<'_> {
@@ -551,6 +574,7 @@ impl Residuals for MeasuredArm<'_> {
         let observed = self.observed();
         let slopes = J.is_some();
         let mut all = DMatrix::zeros(if slopes { m } else { 0 }, unknowns.len());
+        // Reading after reading of one pose, each into its rows.
         for (reading, first) in self.by_pose() {
             let block = self.block(&mut workspaces, reading, own, slopes)?;
             // Derivatives do not exist at a dead point of a loop.

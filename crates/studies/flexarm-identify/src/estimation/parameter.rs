@@ -1,4 +1,11 @@
 //! Unknown parameters of an arm, and the arm with given parameter values.
+//!
+//! A parameter has three coordinates: its value in the robot file, the search coordinate x (0 at the
+//! initial value, often a logarithm) in which derivatives are, and the unknown z of the fit, a
+//! compliance for springs. Start at [`Parameter`] and [`NominalArm::with`].
+//!
+//! Frames: B body, J joint frame in its parent P, L link, T tool; inertias about Bo in B axes.
+//! Not here: names and places in the robot file ([`crate::parameters`]).
 
 use std::sync::Arc;
 
@@ -272,6 +279,35 @@ impl Parameter {
         }
     }
 
+    /// Changes the springs that the parameter affects, to the search coordinate `x`.
+    fn change_springs(&self, all: &mut [Spring], x: f64) {
+        match &self.effect {
+            Effect::Stiffness(places) => {
+                places.iter().for_each(|place| stiffen(&mut all[place.spring], place.coordinate, x.exp()));
+            }
+            Effect::Damping(springs) => {
+                springs.iter().for_each(|k| all[*k].damping = all[*k].damping.scaled(x.exp()));
+            }
+            Effect::Damper { spring, coordinate } => {
+                if let Damping::Dampers(d) = &mut all[*spring].damping {
+                    d[*coordinate] *= x.exp();
+                }
+            }
+            Effect::Entry { spring, row, column, factor, .. } => {
+                let K = &mut all[*spring].K;
+                *K += entry_slope(K.nrows(), *row, *column, factor * x);
+            }
+            Effect::Guide { springs, term, .. } => {
+                for spring in springs {
+                    if let Some(SpringCurve::Guide(guide)) = &mut all[*spring].curve {
+                        *guide = guide.with(*term, self.value(x) - guide.number(*term));
+                    }
+                }
+            }
+            Effect::Tool(_) | Effect::Frame { .. } | Effect::Mass(_) | Effect::Link { .. } => {}
+        }
+    }
+
     /// Returns the value at a search coordinate, which is 0 at the initial value.
     pub fn value(&self, x: f64) -> f64 {
         if self.is_logarithmic() { self.initial * x.exp() } else { self.initial + x }
@@ -293,40 +329,12 @@ impl Parameter {
 }
 
 impl NominalArm {
-    /// Returns the plant with parameters at search coordinates `all`.
+    /// Returns the arm with parameters at search coordinates `all`.
     #[must_use]
     pub fn with(&self, parameters: &[Parameter], all: &[f64]) -> Self {
         let mut nominal = self.clone();
         for (k, (parameter, x)) in parameters.iter().zip(all).enumerate() {
             match &parameter.effect {
-                Effect::Stiffness(places) => {
-                    for place in places {
-                        stiffen(&mut nominal.springs[place.spring], place.coordinate, x.exp());
-                    }
-                }
-                Effect::Damping(springs) => {
-                    for spring in springs {
-                        let spring = &mut nominal.springs[*spring];
-                        spring.damping = spring.damping.scaled(x.exp());
-                    }
-                }
-                Effect::Damper { spring, coordinate } => {
-                    if let Damping::Dampers(d) = &mut nominal.springs[*spring].damping {
-                        d[*coordinate] *= x.exp();
-                    }
-                }
-                Effect::Entry { spring, row, column, factor, .. } => {
-                    let K = &mut nominal.springs[*spring].K;
-                    *K += entry_slope(K.nrows(), *row, *column, factor * x);
-                }
-                Effect::Tool(_) => {}
-                Effect::Guide { springs, term, .. } => {
-                    for spring in springs {
-                        if let Some(SpringCurve::Guide(guide)) = &mut nominal.springs[*spring].curve {
-                            *guide = guide.with(*term, parameter.value(*x) - guide.number(*term));
-                        }
-                    }
-                }
                 Effect::Frame { body, twist, .. } => {
                     let moved = nominal.model.bodies()[*body].X_PJ * displacement(&(twist * *x));
                     Arc::make_mut(&mut nominal.model).set_joint_frame(*body, moved);
@@ -336,19 +344,15 @@ impl NominalArm {
                         nominal = nominal.carrying(*body, &scaled(per_kg, *x));
                     }
                 }
+                // Mass and centre of mass of a link multiply: the first of its parameters sets all.
                 Effect::Link { parts, .. } => {
                     let same =
                         |other: &Parameter| matches!(&other.effect, Effect::Link { parts: own, .. } if own == parts);
-                    if parameters[..k].iter().any(same) {
-                        continue;
-                    }
-                    let (factor, shift) = link_change(parameters, all, parts);
-                    for part in parts {
-                        let old = scaled(&part.spatial(1.0, &Vector3::zeros()), -1.0);
-                        let new = part.spatial(factor, &shift);
-                        nominal = nominal.carrying(part.body, &old).carrying(part.body, &new);
+                    if !parameters[..k].iter().any(same) {
+                        nominal = nominal.with_link(parts, link_change(parameters, all, parts));
                     }
                 }
+                _ => parameter.change_springs(&mut nominal.springs, *x),
             }
         }
         let (p, turn) = tool_shift(parameters, all);
@@ -356,6 +360,14 @@ impl NominalArm {
             nominal.tool.X_BF *= Pose::from_parts(Translation3::from(p), Rotation3::new(turn));
         }
         nominal
+    }
+
+    /// Returns the arm with a link's mass multiplied and its centre of mass shifted (m, link axes).
+    fn with_link(&self, parts: &[LinkPart], (factor, shift): (f64, Vector3<f64>)) -> Self {
+        parts.iter().fold(self.clone(), |nominal, part| {
+            let old = scaled(&part.spatial(1.0, &Vector3::zeros()), -1.0);
+            nominal.carrying(part.body, &old).carrying(part.body, &part.spatial(factor, &shift))
+        })
     }
 
     /// Returns the plant with inertia added to a body (about Bo, B axes).
@@ -370,7 +382,7 @@ impl NominalArm {
     ///
     /// # Errors
     /// As [`Plant::new`] and [`Plant::with_coupling`].
-    pub fn held(&self, q: &[f64]) -> Result<Plant, StepError> {
+    pub fn locked(&self, q: &[f64]) -> Result<Plant, StepError> {
         self.coupled(Plant::new(self.model.clone(), self.elastic(), Arc::new(Held(q.to_vec())))?)
     }
 
@@ -387,6 +399,7 @@ impl NominalArm {
         self.springs.iter().map(|spring| Spring { hysteresis: None, ..spring.clone() }).collect()
     }
 
+    /// Returns the plant with the coupling of its gears.
     fn coupled(&self, plant: Plant) -> Result<Plant, StepError> {
         match &self.coupling {
             Some(coupling) => plant.with_coupling(coupling.clone()),
@@ -416,20 +429,25 @@ pub(crate) fn tool_shift(parameters: &[Parameter], x: &[f64]) -> (Vector3<f64>, 
 }
 
 /// Returns the rate of change of an inertia about Bo, B axes, as it moves with velocity `v` at the
-/// point `p` and angular velocity `w`.
+/// point `p` and angular velocity `w`:
+///
+/// ```text
+/// v_o = v - w × p,   dh = m v_o + w × h,   dJ = [w]x J + ([w]x J)ᵀ + 2 (v_o·h) 1 - v_o hᵀ - h v_oᵀ
+/// ```
+/// with the first moment h and the rotational inertia J.
 pub(crate) fn carried_along(
     I: &SpatialInertia,
     p: &Vector3<f64>,
     v: &Vector3<f64>,
     w: &Vector3<f64>,
 ) -> SpatialInertia {
-    let at_Bo = v - w.cross(p);
-    let c = I.first_moment;
+    let v_o = v - w.cross(p);
+    let h = I.first_moment;
     let turned = w.cross_matrix() * I.rotational;
-    let moved = Matrix3::identity() * (2.0 * at_Bo.dot(&c)) - at_Bo * c.transpose() - c * at_Bo.transpose();
+    let moved = Matrix3::identity() * (2.0 * v_o.dot(&h)) - v_o * h.transpose() - h * v_o.transpose();
     SpatialInertia {
         mass: 0.0,
-        first_moment: at_Bo * I.mass + w.cross(&c),
+        first_moment: v_o * I.mass + w.cross(&h),
         rotational: turned + turned.transpose() + moved,
     }
 }
@@ -443,6 +461,7 @@ pub(crate) fn scaled(per_kg: &SpatialInertia, kg: f64) -> SpatialInertia {
     }
 }
 
+/// Multiplies the stiffness of a spring, or of one coordinate as `S K S`.
 fn stiffen(spring: &mut Spring, coordinate: Option<usize>, factor: f64) {
     match coordinate {
         Some(k) if spring.K.nrows() > 1 => {

@@ -1,4 +1,6 @@
 //! Placement of unknown instruments: fits of rigid motions and rotations to measured points.
+//!
+//! Start at [`placed`], which gives the search a start; the fit itself moves the instruments further.
 
 use flexarm_kinematics::Pose;
 use nalgebra::{DVector, Matrix3, Rotation3, Translation3, Vector3};
@@ -9,55 +11,59 @@ use crate::estimation::parameter::NominalArm;
 use crate::estimation::reading::{Component, Instrument, Measurements, Reading, ReadingKind};
 
 /// Returns the measurements with each unknown instrument at its best fit to the arm with its
-/// initial values.
+/// initial values; those with prior knowledge stay where it says.
+///
+/// # Errors
+/// [`IdentifyError::Readings`] for too few or collinear points, [`IdentifyError::Model`] without an
+/// equilibrium.
 pub(crate) fn placed(nominal: &NominalArm, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
     let mut placed = measurements.clone();
     for number in 0..measurements.instruments.len() {
-        let of_it = |kind: &ReadingKind| match kind {
-            ReadingKind::InstrumentAt { instrument, .. } => *instrument == number,
-            _ => false,
+        let is_prior = |reading: &Reading| matches!(reading.kind, ReadingKind::InstrumentAt { instrument, .. } if instrument == number);
+        if measurements.readings.iter().any(is_prior) {
+            continue;
+        }
+        let refused = |needed: String| {
+            IdentifyError::Readings(format!("instrument {}: {needed}", measurements.instrument_name(number)))
         };
-        let said = measurements.readings.iter().any(|reading| of_it(&reading.kind));
-        match measurements.instruments[number] {
-            Instrument::Unknown(_) if !said => {
-                let seen = |reading: &Reading| {
+        placed.instruments[number] = match measurements.instruments[number] {
+            known @ Instrument::Known(_) => known,
+            Instrument::Unknown(_) => {
+                let of_it = |reading: &Reading| {
                     let own = matches!(reading.kind, ReadingKind::Place { instrument, .. } if instrument == number);
                     own && reading.position().is_some()
                 };
-                let [world, own] = both_points(nominal, measurements, seen)?;
-                let too_few = || {
-                    IdentifyError::Readings(format!(
-                        "instrument {number}: its pose requires at least three measured places that are not on one \
-                         line, found {}",
+                let [world, own] = both_points(nominal, measurements, of_it)?;
+                Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(|| {
+                    refused(format!(
+                        "its pose requires at least three measured places that are not on one line, found {}",
                         world.len()
                     ))
-                };
-                placed.instruments[number] = Instrument::Unknown(rigid_fit(&world, &own).ok_or_else(too_few)?);
+                })?)
             }
-            Instrument::Axes(_) if !said => {
-                let seen = |reading: &Reading| seen_in_axes(&reading.kind, number);
-                let [world, own] = both_points(nominal, measurements, seen)?;
-                let too_few = || {
-                    IdentifyError::Readings(format!(
-                        "instrument {number}: its axes require displacements with all three components along at least \
-                         two directions, found {}; add such readings, or give its orientation",
+            Instrument::Axes(_) => {
+                let of_it = |reading: &Reading| has_all_components(&reading.kind, number);
+                let [world, own] = both_points(nominal, measurements, of_it)?;
+                Instrument::Axes(rotation_fit(&world, &own).ok_or_else(|| {
+                    refused(format!(
+                        "its axes require displacements with all three components along at least two directions, found \
+                         {}; add such readings, or give its orientation",
                         world.len()
                     ))
-                };
-                placed.instruments[number] = Instrument::Axes(rotation_fit(&world, &own).ok_or_else(too_few)?);
+                })?)
             }
-            _ => {}
-        }
+        };
     }
     Ok(placed)
 }
 
 /// Whether a reading consists of exactly the three components of a displacement in the axes of an
 /// instrument.
-fn seen_in_axes(kind: &ReadingKind, instrument: usize) -> bool {
+fn has_all_components(kind: &ReadingKind, instrument: usize) -> bool {
     let ReadingKind::Displacement { rows, .. } = kind else { return false };
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-    rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == Component::AlongSeen(instrument, axis))
+    let of = |direction| Component { direction, instrument: Some(instrument), rotation: false };
+    rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == of(axis))
 }
 
 /// Returns the vectors of some readings, predicted in world axes by the arm with its initial
@@ -67,31 +73,43 @@ fn both_points(
     measurements: &Measurements,
     some: impl Fn(&Reading) -> bool,
 ) -> Result<[Vec<Vector3<f64>>; 2], IdentifyError> {
-    let seen = measurements.in_world(|k| some(&measurements.readings[k]));
-    let arm = MeasuredArm { nominal, parameters: &[], measurements: &seen };
+    let some = measurements.in_world(|k| some(&measurements.readings[k]));
+    let arm = MeasuredArm { nominal, parameters: &[], measurements: &some };
     Ok([points(&arm.predicted(&DVector::zeros(0))?), points(&arm.observed())])
 }
 
+/// Returns consecutive triples as vectors.
 pub(crate) fn points(values: &[f64]) -> Vec<Vector3<f64>> {
     values.chunks_exact(3).map(Vector3::from_column_slice).collect()
 }
 
-/// Returns the rotation and translation that map points onto others with the least sum of squares
+/// Returns the rigid motion X that minimises `Σ |X p_k - q_k|²` for points p, q in two frames
 /// (Arun, Huang and Blostein 1987).
+///
+/// Returns `None` with fewer than three points, with collinear points, and with points that are not
+/// finite.
+///
+/// # Panics
+/// Panics if the numbers of points differ.
 pub fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
+    assert_eq!(from.len(), to.len(), "a rigid fit maps each point onto one");
     let n = from.len();
     if n < 3 {
         return None;
     }
-    let middle = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / n as f64;
-    let (a, b) = (middle(from), middle(to));
-    let less = |points: &[Vector3<f64>], middle| points.iter().map(|p| p - middle).collect::<Vec<_>>();
-    let R = rotation_fit(&less(from, a), &less(to, b))?;
+    // The rotation maps the points about their means; the translation maps the means.
+    let mean = |points: &[Vector3<f64>]| points.iter().sum::<Vector3<f64>>() / n as f64;
+    let (a, b) = (mean(from), mean(to));
+    let centred = |points: &[Vector3<f64>], mean| points.iter().map(|p| p - mean).collect::<Vec<_>>();
+    let R = rotation_fit(&centred(from, a), &centred(to, b))?;
     Some(Pose::from_parts(Translation3::from(b - R * a), R))
 }
 
-/// Returns the rotation that maps vectors onto others with the least sum of squares; `None` if all
-/// are collinear.
+/// Returns the rotation R that minimises `Σ |R p_k - q_k|²`; `None` if all vectors are collinear.
+///
+/// ```text
+/// Σ p qᵀ = U S Vᵀ,   R = V D Uᵀ,   D = 1 but for ±1 at the smallest singular value, so that det R = 1
+/// ```
 pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rotation3<f64>> {
     let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| p * q.transpose()).sum();
     if !H.norm_squared().is_finite() {

@@ -1,4 +1,7 @@
-//! Readings, and the instruments and targets they refer to.
+//! Readings, and the instruments and targets they refer to: plain data in SI units.
+//!
+//! Start at [`Measurements`]. Unknowns of the measurements stand behind those of the parameters: six or
+//! three per instrument, then three per target. Not here: predictions ([`super::measurement`]).
 
 use flexarm_kinematics::{Frame, Pose, SpatialInertia, Wrench};
 use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
@@ -44,27 +47,24 @@ pub struct Row<T> {
 
 /// Component of a displacement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Component {
-    /// Translation along a unit vector in world axes.
-    Along(Vector3<f64>),
-    /// Rotation about a unit vector in world axes.
-    About(Vector3<f64>),
-    /// Translation along a unit vector in the axes of an instrument, given by its number.
-    AlongSeen(usize, Vector3<f64>),
-    /// Rotation about a unit vector in the axes of an instrument, given by its number.
-    AboutSeen(usize, Vector3<f64>),
+pub struct Component {
+    /// Unit vector: direction of a translation, or axis of a rotation.
+    pub direction: Vector3<f64>,
+    /// Number of the instrument in whose axes the direction is; world axes if `None`.
+    pub instrument: Option<usize>,
+    /// Whether it is a component of the rotation vector.
+    pub rotation: bool,
 }
 
 impl Component {
-    /// Returns the direction, the number of the instrument in whose axes it is given (`None`: world
-    /// axes), and whether the component is a rotation.
-    pub fn parts(&self) -> (Vector3<f64>, Option<usize>, bool) {
-        match *self {
-            Self::Along(d) => (d, None, false),
-            Self::About(d) => (d, None, true),
-            Self::AlongSeen(instrument, d) => (d, Some(instrument), false),
-            Self::AboutSeen(instrument, d) => (d, Some(instrument), true),
-        }
+    /// Returns the translation along a unit vector in world axes.
+    pub fn along(direction: Vector3<f64>) -> Self {
+        Self { direction, instrument: None, rotation: false }
+    }
+
+    /// Returns the rotation about a unit vector in world axes.
+    pub fn about(direction: Vector3<f64>) -> Self {
+        Self { direction, instrument: None, rotation: true }
     }
 }
 
@@ -156,10 +156,10 @@ impl MeasuredShape {
         let measured = self.unit();
         let of = |j: usize| {
             let phi = found.shapes.column(j);
-            let seen = DVector::from_iterator(self.probes.len(), found.structure.rows.iter().map(|row| (row * phi)[0]));
-            let seen = seen.try_normalize(0.0)?;
-            let along = seen.dot(&measured);
-            Some((j, along * along, if along < 0.0 { -seen } else { seen }))
+            let a = DVector::from_iterator(self.probes.len(), found.structure.rows.iter().map(|row| (row * phi)[0]));
+            let unit = a.try_normalize(0.0)?;
+            let along = unit.dot(&measured);
+            Some((j, along * along, if along < 0.0 { -unit } else { unit }))
         };
         let all = (0..found.omega2.len()).filter_map(of);
         all.max_by(|a, b| a.1.total_cmp(&b.1))
@@ -293,7 +293,7 @@ impl Reading {
     /// Returns the error of each number.
     fn noise(&self) -> Vec<Noise> {
         let kind = |row: usize| match &self.kind {
-            ReadingKind::Displacement { rows, .. } => Some(usize::from(rows[row].of.parts().2)),
+            ReadingKind::Displacement { rows, .. } => Some(usize::from(rows[row].of.rotation)),
             ReadingKind::Place { .. } => Some(2),
             ReadingKind::Known { .. } | ReadingKind::TargetAt { .. } | ReadingKind::InstrumentAt { .. } => None,
             ReadingKind::Frequencies { .. } => Some(3),
@@ -355,6 +355,8 @@ pub struct Measurements {
     pub links: Vec<Option<Frame>>,
     /// Instruments.
     pub instruments: Vec<Instrument>,
+    /// Names of the instruments for messages; may be empty.
+    pub instrument_names: Vec<String>,
 }
 
 impl Measurements {
@@ -370,6 +372,12 @@ impl Measurements {
         self.readings.iter().flat_map(Reading::noise).collect()
     }
 
+    /// Returns the name of an instrument for messages; its number without a name.
+    pub(crate) fn instrument_name(&self, number: usize) -> String {
+        self.instrument_names.get(number).map_or_else(|| number.to_string(), |name| format!("{name:?}"))
+    }
+
+    /// Returns the number of unknowns of the instruments.
     fn of_instruments(&self) -> usize {
         self.instruments.iter().map(Instrument::unknowns).sum()
     }
@@ -422,7 +430,7 @@ impl Measurements {
     /// first unknown of its position and of its rotation.
     pub(crate) fn instrument(&self, number: usize, own: &[f64]) -> (Pose, Option<usize>, Option<usize>) {
         let first = self.instruments[..number].iter().map(Instrument::unknowns).sum();
-        let v = |at: usize| Vector3::new(own[at], own[at + 1], own[at + 2]);
+        let v = |at: usize| Vector3::from_column_slice(&own[at..at + 3]);
         match self.instruments[number] {
             Instrument::Known(X) => (X, None, None),
             Instrument::Unknown(X) => {

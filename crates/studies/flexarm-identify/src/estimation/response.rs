@@ -12,14 +12,15 @@
 //! ```text
 //! dφ_j = Σ_i a_ij φ_i,   a_ij = φ_iᵀ(dK - ω_j² dM)φ_j / (ω_j² - ω_i²),   a_jj = -φ_jᵀ dM φ_j / 2
 //! ```
-//! Start at [`structure_slopes`].
+//! Start at [`structure_slopes`]. Not here: stiffness, mass and their derivatives
+//! ([`super::sensitivity`]).
 
 use flexarm_kinematics::{Frame, Wrench};
-use flexarm_stepping::{Damping, OperatingPoint, Plant, StepError, Tangents};
+use flexarm_stepping::{Damping, ElasticElement, Plant, StepError, Tangents};
 use nalgebra::{Complex, DMatrix, DVector, RowDVector, Vector3};
 
 use crate::estimation::parameter::{Effect, NominalArm, Parameter, entry_slope, slope_of};
-use crate::estimation::sensitivity::{FRAME_STEP, along, eigen, explicit, force_slopes, frames_beside};
+use crate::estimation::sensitivity::{FRAME_STEP, Linearised, frames_beside, linearised};
 
 /// Relative distance between squared frequencies below which the shapes of the two modes are not
 /// determined.
@@ -119,32 +120,19 @@ pub fn structure_slopes(
     q: &[f64],
     probes: &[Probe],
 ) -> Result<StructureSlopes, StepError> {
-    let none = Wrench::zeros();
-    let plant = nominal.held(q)?;
-    let mut at = OperatingPoint::new(plant.clone(), nominal.tool.clone());
-    at.solve(q, &none)?;
-    let forces = force_slopes(&mut at, parameters);
-    let q = at.coordinates().clone();
-    let here = Tangents::at(&plant, &nominal.tool, &none, &q);
-    let (omega2, shapes) = eigen(&here)?;
-    let symmetric = (&here.K + here.K.transpose()) * 0.5;
-    let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
-    let factor = symmetric.cholesky().ok_or_else(singular)?;
+    let plant = nominal.locked(q)?;
+    let as_matrix = |row: RowDVector<f64>| DMatrix::from_row_slice(1, row.len(), row.as_slice());
+    let jacobians = |q: &DVector<f64>| rows(&plant, probes, q).into_iter().map(as_matrix).collect();
+    let found = linearised(nominal, &plant, parameters, q, jacobians)?;
+    let Linearised { q, here, omega2, shapes, slopes: changes } = found;
     let damped = Damped { plant: &plant, M: &here.M, omega2: &omega2, shapes: &shapes };
     let mut slopes = Vec::with_capacity(parameters.len());
-    for (k, parameter) in parameters.iter().enumerate() {
-        let moved = -factor.solve(&forces.column(k));
-        let change = along(&plant, &q, &moved, |q| {
-            let at = Tangents::at(&plant, &nominal.tool, &none, q);
-            let rows =
-                rows(&plant, probes, q).into_iter().map(|row| DMatrix::from_row_slice(1, row.len(), row.as_slice()));
-            [at.K, at.M].into_iter().chain(rows).collect()
-        });
-        let (eK, eM) = explicit(&plant, &nominal.tool, &none, &parameter.effect, &q, &here);
-        let (K, M) = (&change[0] + eK, &change[1] + eM);
+    for (parameter, change) in parameters.iter().zip(changes) {
+        let mut change = change.into_iter();
+        let (K, M) = (change.next().unwrap_or_default(), change.next().unwrap_or_default());
         let D = damped.slope(&parameter.effect, &K, &M);
-        let mut rows: Vec<RowDVector<f64>> =
-            change[2..].iter().map(|row| RowDVector::from_row_slice(row.as_slice())).collect();
+        let mut rows: Vec<RowDVector<f64>> = change.map(|row| RowDVector::from_row_slice(row.as_slice())).collect();
+        // A displaced joint frame moves the probes with all coordinates locked.
         if let Effect::Frame { body, twist, .. } = &parameter.effect {
             let [ahead, behind] = frames_beside(&plant, *body, twist).map(|plant| self::rows(&plant, probes, &q));
             for ((row, up), down) in rows.iter_mut().zip(ahead).zip(behind) {
@@ -153,13 +141,8 @@ pub fn structure_slopes(
         }
         slopes.push(Structure { M, D, K, rows });
     }
-    let rows = rows(&plant, probes, &q);
-    Ok(StructureSlopes {
-        structure: Structure { M: here.M, D: plant.D.clone(), K: here.K, rows },
-        slopes,
-        omega2,
-        shapes,
-    })
+    let structure = Structure { M: here.M, D: plant.D.clone(), K: here.K, rows: rows(&plant, probes, &q) };
+    Ok(StructureSlopes { structure, slopes, omega2, shapes })
 }
 
 /// Computes the Jacobian of each probe along its direction.
@@ -235,8 +218,9 @@ impl Damped<'_> {
         dD
     }
 
+    /// Returns the springs with their derivatives with respect to a parameter.
     fn springs(&self, effect: &Effect) -> Vec<SpringSlope> {
-        let of = |(number, e): (usize, &flexarm_stepping::ElasticElement)| {
+        let of = |(number, e): (usize, &ElasticElement)| {
             let mut dK = DMatrix::zeros(e.size, e.size);
             let (mut more, mut damper) = (0.0, None);
             match effect {
@@ -274,7 +258,12 @@ impl Damped<'_> {
     }
 
     /// Adds the derivative of `D = Σ 2 ζ_j ω_j Mφ_j (Mφ_j)ᵀ`, where ζ_j is the mean over the
-    /// springs weighted by strain energy.
+    /// springs weighted by strain energy:
+    ///
+    /// ```text
+    /// ζ_j = Σ ζ_s φᵀK_sφ / Σ φᵀK_sφ,   dω_j = φᵀ(dK - ω² dM)φ / 2ω,   c = 2ζω,   v = Mφ
+    /// dD  = Σ_j dc v vᵀ + c (dv vᵀ + v dvᵀ)
+    /// ```
     fn add_modal(&self, springs: &[SpringSlope], dK: &DMatrix<f64>, dM: &DMatrix<f64>, dD: &mut DMatrix<f64>) {
         let (S, T) = (self.shapes.tr_mul(&(dK * self.shapes)), self.shapes.tr_mul(&(dM * self.shapes)));
         let n = self.omega2.len();
@@ -344,6 +333,8 @@ pub struct ResponseSlopes {
 impl StructureSlopes {
     /// Computes `H(ω)` of the probe `watched` per newton at the probe `hit` (indices of the probes)
     /// at `omega` (rad/s), and its derivatives with respect to the parameters.
+    ///
+    /// Cost per frequency: two factorisations of an n×n complex matrix, one without parameters.
     ///
     /// # Errors
     /// [`StepError::Singular`] at an undamped resonance.

@@ -7,7 +7,11 @@
 //! with r the unbalanced forces. One factorisation at an operating point serves all parameters. The
 //! explicit parts of dK/dx and dM/dx are exact; the parts due to the change of the equilibrium are
 //! central differences of fourth order of the analytic tangents along de/dx.
+//!
+//! Start at [`tool_slopes`] for forces and poses, at [`linearised`] for matrices and modes. Not here:
+//! damping and frequency responses ([`super::response`]).
 
+use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, SpatialInertia, Twist, Wrench, rotation_vector};
@@ -26,7 +30,7 @@ const DIFFERENCE: f64 = 1e-3;
 
 /// Computes `dr/dx`, the derivative of the unbalanced forces on the elastic coordinates with
 /// respect to each parameter, n×p.
-pub(crate) fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> DMatrix<f64> {
+fn force_slopes(at: &mut OperatingPoint, parameters: &[Parameter]) -> DMatrix<f64> {
     let tool = at.tool().clone();
     slopes_at_rest(at, parameters, &tool).0
 }
@@ -104,6 +108,11 @@ fn per_unit(guide: &Guide, term: GuideTerm) -> f64 {
 
 /// Computes the derivatives of the tool pose as twists (world axes, at the tool's origin; m, rad)
 /// per unit of each parameter's coordinate, 6×p, at a solved pose.
+///
+/// ```text
+/// V_T = V_rigid - J (K + dp/de)^-1 dr/dx
+/// ```
+/// Cost: one solution with the factor of the operating point, whatever the number of parameters.
 ///
 /// For [`Effect::Tool`] this is only the part due to deflection, which is zero here: loads stay in
 /// place, and the motion of the frame itself is not included. [`crate::estimation::MeasuredArm`]
@@ -217,65 +226,96 @@ pub fn frequency_slopes(
     q: &[f64],
 ) -> Result<FrequencySlopes, StepError> {
     let plant = nominal.at_rest(q)?;
-    let none = Wrench::zeros();
-    let mut at = OperatingPoint::new(plant.clone(), nominal.tool.clone());
+    let Linearised { omega2, shapes, slopes: changes, .. } =
+        linearised(nominal, &plant, parameters, q, |_| Vec::new())?;
+    let mut slopes = DMatrix::zeros(omega2.len(), parameters.len());
+    for (k, change) in changes.iter().enumerate() {
+        for (i, w2) in omega2.iter().enumerate() {
+            let phi = shapes.column(i);
+            let slope = phi.dot(&(&change[0] * phi)) - w2 * phi.dot(&(&change[1] * phi));
+            slopes[(i, k)] = slope / (2.0 * w2.sqrt() * TAU);
+        }
+    }
+    Ok(FrequencySlopes { hz: omega2.iter().map(|w2| w2.sqrt() / TAU).collect(), slopes })
+}
+
+/// An arm with locked drives at its equilibrium under gravity, and its total derivatives.
+pub(crate) struct Linearised {
+    /// All coordinates at the equilibrium.
+    pub(crate) q: DVector<f64>,
+    /// Stiffness, mass and Jacobian there.
+    pub(crate) here: Tangents,
+    /// Squares of the natural frequencies, ascending (rad²/s²).
+    pub(crate) omega2: Vec<f64>,
+    /// Mode shapes with `φᵀ M φ = 1`, one column each.
+    pub(crate) shapes: DMatrix<f64>,
+    /// Per parameter: derivatives of K, of M, and of the further matrices along the equilibrium.
+    pub(crate) slopes: Vec<Vec<DMatrix<f64>>>,
+}
+
+/// Solves the equilibrium at a pose, and computes modes and total derivatives there.
+///
+/// ```text
+/// de/dx = -K^-1 dr/dx,   dK/dx = ∂K/∂x + ∂K/∂e de/dx,   dM/dx alike
+/// ```
+/// * `more`: further matrices of the coordinates, differentiated along `de/dx`.
+///
+/// # Errors
+/// As [`frequency_slopes`].
+pub(crate) fn linearised(
+    nominal: &NominalArm,
+    plant: &Plant,
+    parameters: &[Parameter],
+    q: &[f64],
+    more: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
+) -> Result<Linearised, StepError> {
+    let (tool, none) = (&nominal.tool, Wrench::zeros());
+    let mut at = OperatingPoint::new(plant.clone(), tool.clone());
     at.solve(q, &none)?;
     let forces = force_slopes(&mut at, parameters);
-    let here = Tangents::at(&plant, &nominal.tool, &none, at.coordinates());
+    let q = at.coordinates().clone();
+    let here = Tangents::at(plant, tool, &none, &q);
     let (omega2, shapes) = eigen(&here)?;
     let symmetric = (&here.K + here.K.transpose()) * 0.5;
     let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
     let factor = symmetric.cholesky().ok_or_else(singular)?;
-    let mut slopes = DMatrix::zeros(omega2.len(), parameters.len());
-    for (k, parameter) in parameters.iter().enumerate() {
-        let moved = -factor.solve(&forces.column(k));
-        let change = along(&plant, at.coordinates(), &moved, |q| {
-            let at = Tangents::at(&plant, &nominal.tool, &none, q);
-            vec![at.K, at.M]
+    let slopes = parameters.iter().enumerate().map(|(k, parameter)| {
+        let de = -factor.solve(&forces.column(k));
+        let mut change = along(plant, &q, &de, |q| {
+            let at = Tangents::at(plant, tool, &none, q);
+            [at.K, at.M].into_iter().chain(more(q)).collect()
         });
-        let (eK, eM) = explicit(&plant, &nominal.tool, &none, &parameter.effect, at.coordinates(), &here);
-        let (dK, dM) = (&change[0] + eK, &change[1] + eM);
-        for (i, w2) in omega2.iter().enumerate() {
-            let phi = shapes.column(i);
-            let slope = phi.dot(&(&dK * phi)) - w2 * phi.dot(&(&dM * phi));
-            slopes[(i, k)] = slope / (2.0 * w2.sqrt() * std::f64::consts::TAU);
-        }
-    }
-    Ok(FrequencySlopes { hz: omega2.iter().map(|w2| w2.sqrt() / std::f64::consts::TAU).collect(), slopes })
+        let (dK, dM) = explicit(plant, tool, &none, &parameter.effect, &q, &here);
+        change[0] += dK;
+        change[1] += dM;
+        change
+    });
+    let slopes = slopes.collect();
+    Ok(Linearised { q, here, omega2, shapes, slopes })
 }
 
 /// Squares of the natural frequencies, ascending, and mode shapes with `φᵀ M φ = 1`.
-pub(crate) fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
+fn eigen(at: &Tangents) -> Result<(Vec<f64>, DMatrix<f64>), StepError> {
     let modes = modes_of(&((&at.K + at.K.transpose()) * 0.5), &at.M, 0.0)?;
     Ok((modes.omega.iter().map(|omega| omega * omega).collect(), modes.shapes))
 }
 
 /// Computes the derivative of matrices that depend on the coordinates, as the elastic coordinates
-/// move by `de` per unit.
-pub(crate) fn along(
+/// move by `de` per unit: central differences of fourth order.
+fn along(
     plant: &Plant,
     q: &DVector<f64>,
     de: &DVector<f64>,
-    look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
+    matrices: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
 ) -> Vec<DMatrix<f64>> {
     let mut dq = DVector::zeros(q.len());
     dq.rows_mut(plant.model.n_actuated(), de.len()).copy_from(de);
-    along_coordinates(q, &dq, look)
-}
-
-/// As [`along`], for a motion `dq` of all coordinates: central differences of fourth order.
-pub(crate) fn along_coordinates(
-    q: &DVector<f64>,
-    dq: &DVector<f64>,
-    look: impl Fn(&DVector<f64>) -> Vec<DMatrix<f64>>,
-) -> Vec<DMatrix<f64>> {
     let size = dq.amax();
     if size == 0.0 {
-        return look(q).into_iter().map(|here| here * 0.0).collect();
+        return matrices(q).into_iter().map(|here| here * 0.0).collect();
     }
     let h = DIFFERENCE / size;
-    let shifted = |steps: f64| look(&(q + dq * (steps * h)));
-    let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(shifted);
+    let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(|steps: f64| matrices(&(q + &dq * (steps * h))));
     (0..a.len()).map(|k| ((&c[k] - &b[k]) * 8.0 - (&d[k] - &a[k])) / (12.0 * h)).collect()
 }
 
@@ -298,14 +338,14 @@ pub fn compliance_slopes(
     let solve = |K: &DMatrix<f64>, B: &DMatrix<f64>| K.clone().lu().solve(B).ok_or_else(singular);
     let J = DMatrix::from_fn(6, here.J.ncols(), |i, j| here.J[(i, j)]);
     let (U, Y) = (solve(&here.K, &J.transpose())?, solve(&here.K.transpose(), &J.transpose())?);
-    let look = |q: &DVector<f64>| {
+    let matrices = |q: &DVector<f64>| {
         let at = Tangents::at(&plant, &tool, F_T_W, q);
         vec![DMatrix::from_fn(6, at.J.ncols(), |i, j| at.J[(i, j)]), at.K]
     };
     let mut found = Vec::with_capacity(parameters.len());
     for (k, parameter) in parameters.iter().enumerate() {
         let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
-        let change = along(&plant, &q, &moved, look);
+        let change = along(&plant, &q, &moved, matrices);
         let (eK, _) = explicit(&plant, &tool, F_T_W, &parameter.effect, &q, &here);
         // dC = dJ K^-1 Jᵀ + J K^-1 dJᵀ - J K^-1 dK K^-1 Jᵀ
         let dC = &change[0] * &U + Y.tr_mul(&change[0].transpose()) - Y.tr_mul(&((&change[1] + eK) * &U));
@@ -315,7 +355,7 @@ pub fn compliance_slopes(
 }
 
 /// Computes the explicit derivatives of stiffness and mass with respect to the parameter.
-pub(crate) fn explicit(
+fn explicit(
     plant: &Plant,
     tool: &Frame,
     F_T_W: &Wrench,

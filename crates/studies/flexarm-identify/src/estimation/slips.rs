@@ -69,7 +69,7 @@ pub fn likely_slip(
     let is_spring = |p: &&Parameter| matches!(p.effect, Effect::Stiffness(_));
     let springs: Vec<Parameter> = parameters.iter().filter(is_spring).cloned().collect();
     let moved = some_of(measurements, |reading| match &reading.kind {
-        ReadingKind::Displacement { rows, .. } => rows.iter().all(|row| matches!(row.of, Component::Along(_))),
+        ReadingKind::Displacement { rows, .. } => rows.iter().all(|row| row.of == Component::along(row.of.direction)),
         _ => false,
     });
     let found = (!springs.is_empty() && moved.rows() >= 3 * springs.len()).then(|| {
@@ -208,7 +208,7 @@ impl Displacements {
     /// Returns the rotation into world axes with the smallest residual, and this residual. Fits
     /// compliances and rotation alternately, starting from all 24 axis-aligned rotations.
     fn turned(&self) -> Option<(Rotation3<f64>, f64)> {
-        let seen = points(self.b.as_slice());
+        let measured = points(self.b.as_slice());
         let upright = [Vector3::x(), Vector3::y(), Vector3::z()];
         let signed: Vec<Vector3<f64>> = upright.iter().flat_map(|v| [*v, -v]).collect();
         let begins = signed.iter().flat_map(|x| signed.iter().filter(|y| x.dot(y) == 0.0).map(move |y| (*x, *y)));
@@ -216,11 +216,12 @@ impl Displacements {
             let mut R = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::from_columns(&[x, y, x.cross(&y)]));
             let mut rest = f64::INFINITY;
             for _ in 0..ROUNDS {
-                let world: Vec<f64> = seen.iter().flat_map(|v| (R * v).iter().copied().collect::<Vec<_>>()).collect();
+                let world: Vec<f64> =
+                    measured.iter().flat_map(|v| (R * v).iter().copied().collect::<Vec<_>>()).collect();
                 let world = DVector::from_vec(world);
                 let explained = self.explained(&world);
                 rest = (&world - &explained).norm() / world.norm();
-                R = rotation_fit(&seen, &points(explained.as_slice()))?;
+                R = rotation_fit(&measured, &points(explained.as_slice()))?;
             }
             Some((R, rest))
         });
@@ -231,24 +232,24 @@ impl Displacements {
 /// Returns the residual of the positions over their spread, with each instrument at its best fit.
 fn place_rest(nominal: &NominalArm, measurements: &Measurements) -> Option<f64> {
     let arm = MeasuredArm { nominal, parameters: &[], measurements };
-    let (world, seen) = (points(&arm.predicted(&DVector::zeros(0)).ok()?), points(&arm.observed()));
+    let (predicted, measured) = (points(&arm.predicted(&DVector::zeros(0)).ok()?), points(&arm.observed()));
     let (mut rest, mut spread) = (0.0, 0.0);
     for number in 0..measurements.instruments.len() {
-        let own: Vec<usize> = (0..seen.len())
+        let own: Vec<usize> = (0..measured.len())
             .filter(|k| {
                 matches!(measurements.readings[*k].kind, ReadingKind::Place { instrument, .. } if instrument == number)
             })
             .collect();
         let of = |all: &[Vector3<f64>]| own.iter().map(|k| all[*k]).collect::<Vec<_>>();
-        let (world, seen) = (of(&world), of(&seen));
-        if seen.len() < 5 {
+        let (p, q) = (of(&predicted), of(&measured));
+        if q.len() < 5 {
             continue;
         }
-        let X = rigid_fit(&world, &seen)?;
-        let middle = seen.iter().sum::<Vector3<f64>>() / seen.len() as f64;
-        for (p, q) in world.iter().zip(&seen) {
+        let X = rigid_fit(&p, &q)?;
+        let mean = q.iter().sum::<Vector3<f64>>() / q.len() as f64;
+        for (p, q) in p.iter().zip(&q) {
             rest += (X.rotation * p + X.translation.vector - q).norm_squared();
-            spread += (q - middle).norm_squared();
+            spread += (q - mean).norm_squared();
         }
     }
     (spread > 0.0).then(|| (rest / spread).sqrt())

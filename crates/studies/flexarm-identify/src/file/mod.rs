@@ -1,5 +1,8 @@
 //! File of measurements (`docs/identify.md`): single readings or tables, units, and the unknown
 //! parameters.
+//!
+//! Start at [`read`]. Each kind of reading has a module with its entry and its method of [`Reader`];
+//! responses and mode shapes are in [`crate::response_file`]. Values leave in SI units.
 
 mod common;
 mod displacement;
@@ -12,8 +15,10 @@ mod recording;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::estimation::{Loss, Measurements};
 use flexarm_files::read_text;
+use flexarm_run::robot_file::Source;
+use flexarm_run::toml_file::parsed;
+use flexarm_run::{Error, RobotFileError};
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -24,13 +29,10 @@ use self::place::PlaceEntry;
 use self::reader::Units;
 use self::recording::EncodersEntry;
 use super::response_file::{NodeEntry, ResponseEntry, ShapeEntry};
-use flexarm_run::Error;
-use flexarm_run::RobotFileError;
-use flexarm_run::robot_file::Source;
-use flexarm_run::toml_file::parsed;
+use crate::estimation::{Loss, Measurements};
 
 pub(super) use self::common::{Joints, LoadEntry};
-pub(super) use self::reader::{Cell, Reader};
+pub(super) use self::reader::{Cell, Reader, Site, located};
 pub(super) use self::recording::EncoderRecording;
 
 /// Contents of the file as written.
@@ -85,7 +87,6 @@ struct ParameterEntry {
 pub(super) struct MeasurementInput {
     pub(super) measurements: Measurements,
     pub(super) recordings: Vec<EncoderRecording>,
-    pub(super) instruments: Vec<String>,
     pub(super) targets: Vec<String>,
     /// Name patterns of the unknown parameters, with their places in the file; empty for all
     /// stiffnesses.
@@ -123,13 +124,13 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         angle: unit("angle", &file.angle, &ANGLES, &source)?.1,
         force: unit("force", &file.force, &FORCES, &source)?.1,
     };
+    // Readings refer to instruments, targets and nodes; recordings are estimated later.
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut reader = Reader {
         cell,
         source: &source,
         folder,
         units,
-        instruments: Vec::new(),
         targets: Vec::new(),
         measurements: Measurements::default(),
         empty_rows: 0,
@@ -139,8 +140,9 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
     if reader.measurements.readings.is_empty() && recordings.is_empty() {
         let text = "there is no reading: add [[displacement]], [[place]], [[frequency]], [[response]], [[shape]] or \
                     [[encoders]]";
-        return Err(reader.error(0..0, text));
+        return Err(source.error(0..0, text).into());
     }
+    // Patterns and uncertainties keep their places: they are checked against the robot later.
     let given =
         |list: &[Spanned<String>]| list.iter().map(|p| (p.get_ref().clone(), source.error(p.span(), ""))).collect();
     let known = file.parameter.iter().map(|entry| {
@@ -148,7 +150,6 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         Ok((entry.name.get_ref().clone(), uncertainty(&entry.uncertainty, 0.0, &source)?, place))
     });
     Ok(MeasurementInput {
-        instruments: reader.instruments,
         targets: reader.targets,
         measurements: reader.measurements,
         recordings,
@@ -217,6 +218,6 @@ impl Reader<'_> {
         for (k, entry) in file.shape.iter().enumerate() {
             self.shape(&file.node, k, entry)?;
         }
-        self.settle_frames(&file.instrument, &file.target)
+        self.choose_unknown_frames(&file.instrument, &file.target)
     }
 }

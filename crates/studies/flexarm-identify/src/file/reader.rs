@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
+use flexarm_files::NumberTable;
 use flexarm_kinematics::Frame;
 use flexarm_run::robot_file::Source;
 use flexarm_run::{Arm, Error};
@@ -26,13 +27,38 @@ pub(crate) struct Cell<'a> {
     pub(crate) arm: &'a Arm,
 }
 
+/// Place of a value, for messages.
+#[derive(Clone, Debug)]
+pub(crate) enum Site<'a> {
+    /// Bytes of the file of measurements.
+    Entry(Range<usize>),
+    /// Row of a table, from 0.
+    Row(&'a NumberTable, usize),
+}
+
+impl<T> From<&Spanned<T>> for Site<'_> {
+    fn from(value: &Spanned<T>) -> Self {
+        Self::Entry(value.span())
+    }
+}
+
+/// Returns a value of the file of measurements with its place.
+pub(crate) fn located<T: Clone>(value: &Option<Spanned<T>>) -> Option<(T, Site<'static>)> {
+    value.as_ref().map(|value| (value.get_ref().clone(), value.into()))
+}
+
+impl<'a> From<&Site<'a>> for Site<'a> {
+    fn from(site: &Self) -> Self {
+        site.clone()
+    }
+}
+
 /// State of the reader.
 pub(crate) struct Reader<'a> {
     pub(crate) cell: &'a Cell<'a>,
     pub(super) source: &'a Source,
     pub(crate) folder: &'a Path,
     pub(crate) units: Units,
-    pub(super) instruments: Vec<String>,
     pub(super) targets: Vec<String>,
     pub(crate) measurements: Measurements,
     /// Number of rows of tables of places without a reading.
@@ -40,8 +66,12 @@ pub(crate) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    pub(crate) fn error(&self, span: Range<usize>, message: impl Into<String>) -> Error {
-        self.source.error(span, message).into()
+    /// Creates an error with file, line and column.
+    pub(crate) fn error<'a>(&self, site: impl Into<Site<'a>>, message: impl Into<String>) -> Error {
+        match site.into() {
+            Site::Entry(span) => self.source.error(span, message).into(),
+            Site::Row(table, row) => table.error(Some(row), message).into(),
+        }
     }
 
     /// Returns the frame of a moving link of the flexible arm.
@@ -49,7 +79,7 @@ impl Reader<'_> {
         let model = &self.cell.arm.model;
         model.frame(link.get_ref()).filter(|frame| frame.body > 0).cloned().ok_or_else(|| {
             let known: Vec<&str> = flexarm_run::applied_load::moving_links(model);
-            self.error(link.span(), format!("the robot has no moving link {:?}; it has {known:?}", link.get_ref()))
+            self.error(link, format!("the robot has no moving link {:?}; it has {known:?}", link.get_ref()))
         })
     }
 }

@@ -1,16 +1,16 @@
-//! Recordings of motor and link positions over time.
+//! Recordings of motor and link positions over time: columns of a table that the entry names.
+//!
+//! Not here: filters, torques and the estimate of the stiffness ([`crate::encoders`]).
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::path::PathBuf;
 
 use flexarm_files::{NumberTable, named_file};
+use flexarm_run::{Error, RobotFileError};
 use serde::Deserialize;
 use toml::Spanned;
 
-use super::reader::{Reader, Units};
-use flexarm_run::Error;
-use flexarm_run::RobotFileError;
+use super::reader::{Reader, Site, Units};
 
 /// Entry of a recording of motor and link positions.
 #[derive(Debug, Deserialize)]
@@ -76,17 +76,14 @@ struct RecordingTable<'a> {
 
 impl RecordingTable<'_> {
     /// Returns a column, all of whose cells must have a value.
-    fn column(&self, name: &str, span: Range<usize>) -> Result<Vec<f64>, Error> {
+    fn column(&self, name: &str, site: Site<'_>) -> Result<Vec<f64>, Error> {
         let Self { reader, path, table } = self;
         let k = table.column(name).ok_or_else(|| {
-            reader.error(span.clone(), format!("{} has no column {name:?}; it has {:?}", path.display(), table.names))
+            reader.error(site, format!("{} has no column {name:?}; it has {:?}", path.display(), table.names))
         })?;
         let values: Vec<f64> = table.rows.iter().map(|row| row[k]).collect();
         match values.iter().position(|x| !x.is_finite()) {
-            Some(row) => {
-                let line = table.lines[row];
-                Err(reader.error(span, format!("{} line {line}: column {name:?} is empty", path.display())))
-            }
+            Some(row) => Err(table.error(Some(row), format!("column {name:?} is empty, expected a number")).into()),
             None => Ok(values),
         }
     }
@@ -102,7 +99,7 @@ impl RecordingTable<'_> {
         units: [f64; 2],
     ) -> Result<Vec<Option<Vec<f64>>>, Error> {
         let joints = self.reader.cell.joints;
-        let fault = |message: String| self.reader.error(map.span(), message);
+        let fault = |message: String| self.reader.error(map, message);
         let names: Vec<&str> = joints.iter().map(|(name, _)| name.as_str()).collect();
         if let Some(stray) = map.get_ref().keys().find(|name| !names.contains(&name.as_str())) {
             return Err(fault(format!("the robot has no joint {stray:?}; its joints are {names:?}")));
@@ -110,7 +107,7 @@ impl RecordingTable<'_> {
         let one = |(name, slides): &(String, bool)| match map.get_ref().get(name) {
             Some(own) => {
                 let factor = units[usize::from(*slides)];
-                Ok(Some(self.column(own, map.span())?.into_iter().map(|x| x * factor).collect()))
+                Ok(Some(self.column(own, map.into())?.into_iter().map(|x| x * factor).collect()))
             }
             None if needed => Err(fault(format!("joint {name:?} has no column: the torques need all joints"))),
             None => Ok(None),
@@ -120,21 +117,21 @@ impl RecordingTable<'_> {
 }
 
 impl Reader<'_> {
+    /// Reads a recording, and converts the motors of coupled gears to joint positions.
     pub(super) fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
         let e = entry.get_ref();
-        let located = |message| self.error(e.file.span(), message);
-        let path = named_file("file", e.file.get_ref(), self.folder).map_err(located)?;
+        let path = named_file("file", e.file.get_ref(), self.folder).map_err(|message| self.error(&e.file, message))?;
         let table = RecordingTable { reader: self, table: NumberTable::read(&path)?, path };
-        let time = table.column(e.time.get_ref(), e.time.span())?;
+        let time = table.column(e.time.get_ref(), Site::from(&e.time))?;
         let step_s = even_step(&time).ok_or_else(|| {
             let path = table.path.display();
             let text = format!("the times of {path} are not evenly spaced, or there are fewer than three");
-            self.error(e.time.span(), text)
+            self.error(&e.time, text)
         })?;
         let Units { length, angle, force } = self.units;
         let link = table.joints(&e.link, false, [angle, length])?;
         if link.iter().all(Option::is_none) {
-            return Err(self.error(e.link.span(), "no joint has an encoder on the link side of its gear"));
+            return Err(self.error(&e.link, "no joint has an encoder on the link side of its gear"));
         }
         let mut motor: Vec<Vec<f64>> = table.joints(&e.motor, true, [angle, length])?.into_iter().flatten().collect();
         self.behind_coupling(e, &mut motor)?;
@@ -157,7 +154,7 @@ impl Reader<'_> {
         match value {
             None => Ok(default),
             Some(x) if x.get_ref().is_finite() && *x.get_ref() >= 0.0 => Ok(*x.get_ref()),
-            Some(x) => Err(self.error(x.span(), format!("{what} is {}, expected a non-negative number", x.get_ref()))),
+            Some(x) => Err(self.error(x, format!("{what} is {}, expected a non-negative number", x.get_ref()))),
         }
     }
 
@@ -165,12 +162,12 @@ impl Reader<'_> {
     /// from the controller are left unchanged.
     fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
         let Some(coupling) = self.cell.arm.robot().coupling.as_ref() else { return Ok(()) };
-        match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
+        match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word)) {
             Some(("joints", _)) => return Ok(()),
             Some(("motors", _)) => {}
-            Some((other, span)) => {
+            Some((other, word)) => {
                 let text = format!("positions = {other:?} is not known; use \"motors\" or \"joints\"");
-                return Err(self.error(span, text));
+                return Err(self.error(word, text));
             }
             None => {
                 let text = format!(
@@ -179,7 +176,7 @@ impl Reader<'_> {
                      (positions = \"joints\")",
                     coupling.joints
                 );
-                return Err(self.error(e.motor.span(), text));
+                return Err(self.error(&e.motor, text));
             }
         }
         let place = |joint: &String| self.cell.joints.iter().position(|(name, _)| name == joint);

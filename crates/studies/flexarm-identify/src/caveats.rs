@@ -1,14 +1,13 @@
 //! Caveats about an identification.
 
-use crate::estimation::{FittedParameter, Identified, MeasuredArm, NominalArm, ReadingKind};
+use flexarm_run::caveat::FindingKind;
+use flexarm_run::{Finding, Robot};
 use nalgebra::DVector;
 
 use super::answer::{Identification, rms};
 use super::encoders::EncoderFigures;
 use super::file::MeasurementInput;
-use flexarm_run::Finding;
-use flexarm_run::Robot;
-use flexarm_run::caveat::FindingKind;
+use crate::estimation::{FittedParameter, Identified, MeasuredArm, NominalArm, ReadingKind};
 
 /// Measured displacements differ in magnitude from those of the robot.
 const LOAD_UNIT: FindingKind = FindingKind::warning(
@@ -156,15 +155,15 @@ pub(super) fn gear_caveat(robot: &Robot) -> Option<Finding> {
 /// Encoders whose residual exceeds their noise, and whose excess relative to the deflection exceeds
 /// the relative deviation of the stiffness.
 pub(super) fn encoder_caveats(encoders: &[EncoderFigures]) -> impl Iterator<Item = Finding> + '_ {
-    let odd = |gear: &&EncoderFigures| {
+    let exceeds_noise = |gear: &&EncoderFigures| {
         let more = (gear.rest_rms.powi(2) - gear.noise_rms.powi(2)).max(0.0).sqrt();
         let matters = more / gear.deflection_rms > gear.std / gear.stiffness;
         gear.told && matters && gear.rest_rms > ENCODER_REST * gear.noise_rms
     };
-    let told = |gear: &EncoderFigures| {
+    let caveat = |gear: &EncoderFigures| {
         ENCODER_RESIDUAL.found(format!("encoders of {}", gear.joint), gear.rest_rms, gear.noise_rms)
     };
-    encoders.iter().filter(odd).map(told)
+    encoders.iter().filter(exceeds_noise).map(caveat)
 }
 
 /// Displacements under forces, or under masses, that differ from the robot's by more than
