@@ -61,6 +61,8 @@ pub enum LimitKind {
     Acceleration,
     /// Jerk above [`JointLimits::jerk`].
     Jerk,
+    /// Torque or force of a drive above its limit; only callers that know forces find it.
+    Effort,
 }
 
 /// A limit that a joint violates, with the worst value; `Display` gives one line.
@@ -74,9 +76,9 @@ pub struct LimitViolation {
     pub time_s: f64,
     /// Time of the first violation, s.
     pub since_s: f64,
-    /// The worst value with its sign, rad, rad/s, rad/s² or rad/s³ (m, m/s, m/s² or m/s³).
+    /// The worst value with its sign, rad, rad/s, rad/s², rad/s³ or N m (m, m/s, m/s², m/s³ or N).
     pub value: f64,
-    /// The limit, in the same unit; for all but positions with the sign of `value`.
+    /// The limit, in the same unit; for rates with the sign of `value`.
     pub limit: f64,
 }
 
@@ -88,6 +90,7 @@ impl fmt::Display for LimitViolation {
             LimitKind::Velocity => ("velocity exceeds its limit", "allow the move more time"),
             LimitKind::Acceleration => ("acceleration exceeds its limit", "allow the move more time"),
             LimitKind::Jerk => ("jerk exceeds its limit", "allow the move more time"),
+            LimitKind::Effort => ("effort exceeds its limit", "allow the move more time"),
         };
         let Self { joint, time_s, since_s, value, limit, .. } = self;
         write!(
@@ -116,11 +119,12 @@ impl Trajectory {
         for ((joint, curve), limit) in self.joints().iter().zip(self.curves()).zip(limits) {
             let range = limit.upper - limit.lower;
             let slack = if range.is_finite() { ROUNDING * range } else { 0.0 };
-            violations.extend(passed(joint, curve, LimitKind::Lower, limit.lower, slack));
-            violations.extend(passed(joint, curve, LimitKind::Upper, limit.upper, slack));
-            violations.extend(passed(joint, curve, LimitKind::Velocity, limit.velocity, 0.0));
-            violations.extend(passed(joint, curve, LimitKind::Acceleration, limit.acceleration, 0.0));
-            violations.extend(passed(joint, curve, LimitKind::Jerk, limit.jerk, 0.0));
+            let rates = [limit.velocity, limit.acceleration, limit.jerk].map(|rate| [Some(-rate), Some(rate)]);
+            violations.extend(passed(joint, curve, (LimitKind::Lower, 0), [Some(limit.lower), None], slack));
+            violations.extend(passed(joint, curve, (LimitKind::Upper, 0), [None, Some(limit.upper)], slack));
+            violations.extend(passed(joint, curve, (LimitKind::Velocity, 1), rates[0], 0.0));
+            violations.extend(passed(joint, curve, (LimitKind::Acceleration, 2), rates[1], 0.0));
+            violations.extend(passed(joint, curve, (LimitKind::Jerk, 3), rates[2], 0.0));
         }
         violations
     }
@@ -128,18 +132,15 @@ impl Trajectory {
 
 /// Checks one limit of one joint.
 ///
-/// * `rounding`: excess that does not count (rad or m).
-fn passed(joint: &str, curve: &Curve, kind: LimitKind, limit: f64, rounding: f64) -> Option<LimitViolation> {
-    if !limit.is_finite() {
-        return None;
-    }
-    let (order, upper, lower) = match kind {
-        LimitKind::Lower => (0, None, Some(limit)),
-        LimitKind::Upper => (0, Some(limit), None),
-        LimitKind::Velocity => (1, Some(limit), Some(-limit)),
-        LimitKind::Acceleration => (2, Some(limit), Some(-limit)),
-        LimitKind::Jerk => (3, Some(limit), Some(-limit)),
-    };
+/// * `order`: of the derivative that is limited. `rounding`: excess that does not count (rad or m).
+fn passed(
+    joint: &str,
+    curve: &Curve,
+    (kind, order): (LimitKind, usize),
+    [lower, upper]: [Option<f64>; 2],
+    rounding: f64,
+) -> Option<LimitViolation> {
+    let limit = upper.or(lower).filter(|limit| limit.is_finite())?;
     let slack = RELATIVE_SLACK * limit.abs() + ABSOLUTE_SLACK;
 
     // Excess over either limit; the worse side is reported, the earlier one sets `since_s`.

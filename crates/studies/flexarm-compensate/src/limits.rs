@@ -7,7 +7,7 @@ use flexarm_trajectory::{Extreme, JointLimits};
 
 use super::{CompensateError, CompensateRequest, Compensation, MotionPair, Stop, attempt};
 use flexarm_run::motion::limits as limits_of;
-use flexarm_run::motion_report::{of_effort, of_limit};
+use flexarm_run::motion_report::of_effort;
 use flexarm_run::{Arm, Error, Finding, Motion, MotionViolation, Robot, Scenario};
 
 /// Increase of a violation over that of the motion itself, as a fraction of the limit, up to which
@@ -53,11 +53,11 @@ pub(super) fn passed(
     for (limit, acceleration) in limits.iter_mut().zip(&request.accelerations) {
         *limit = JointLimits { acceleration: *acceleration, ..*limit };
     }
-    let mut passed: Vec<MotionViolation> = motion.trajectory.check_limits(&limits).iter().map(of_limit).collect();
+    let mut passed = motion.trajectory.check_limits(&limits);
     for (c, worst) in model.coordinates().iter().zip(efforts) {
-        passed.extend(of_effort(&c.joint, worst, worst.time_s, c.limits.effort, "flexible robot"));
+        passed.extend(of_effort(&c.joint, worst, worst.time_s, c.limits.effort));
     }
-    Ok(passed)
+    Ok(passed.iter().map(MotionViolation::from).collect())
 }
 
 /// Returns the violations that the motion itself does not have, or has to a lesser degree.

@@ -1,4 +1,7 @@
 //! Loads as values, for programs that do not use a loads file.
+//!
+//! Wrenches act at the origin of a frame; N, N m, s. Not here: files of loads (`loads_file`), kinds of
+//! curves in them.
 
 use flexarm_kinematics::{Frame, Model, Wrench};
 use flexarm_settings::{Quantity, known_names};
@@ -61,21 +64,8 @@ impl AppliedLoad {
             );
             return Err(Error::Load(message));
         }
-        let (times, F) = (t.to_vec(), F.to_vec());
-        let wrench = {
-            let times = times.clone();
-            move |t: f64| match times.partition_point(|x| *x <= t) {
-                0 => Wrench::zeros(),
-                k if k < times.len() => {
-                    let s = (t - times[k - 1]) / (times[k] - times[k - 1]);
-                    F[k - 1] * (1.0 - s) + F[k] * s
-                }
-                k if t == times[k - 1] => F[k - 1],
-                _ => Wrench::zeros(),
-            }
-        };
-        let start_s = times[0];
-        Ok(Self::new(frame, TimedWrench::new(wrench).with_jumps(times)).starting_at(start_s))
+        let wrench = interpolated(t.to_vec(), F.to_vec());
+        Ok(Self::new(frame, TimedWrench::new(wrench).with_jumps(t.to_vec())).starting_at(t[0]))
     }
 
     /// Returns the load on a model, up to the end of a run (s).
@@ -91,6 +81,18 @@ impl AppliedLoad {
             force.and(torque).map_err(|cause| LoadLocation::entry(self.written.as_ref(), cause))?;
         }
         Ok(Load { body: frame.body, X_BF: frame.X_BF, wrench: self.wrench.clone().with_jumps(jumps) })
+    }
+}
+
+/// Returns a wrench over time that is linear between samples and zero outside them; at least two.
+pub(crate) fn interpolated(t: Vec<f64>, F: Vec<Wrench>) -> impl Fn(f64) -> Wrench + Send + Sync {
+    move |at| {
+        let last = t.len() - 1;
+        if !(t[0]..=t[last]).contains(&at) {
+            return Wrench::zeros();
+        }
+        let k = t.partition_point(|x| *x <= at).min(last);
+        F[k - 1] + (F[k] - F[k - 1]) * ((at - t[k - 1]) / (t[k] - t[k - 1]))
     }
 }
 

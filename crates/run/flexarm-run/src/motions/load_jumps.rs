@@ -1,4 +1,4 @@
-//! Detection of jumps in a load that is only known as a function of time.
+//! Detection of jumps in a load that is only known as a function of time, by bisection.
 
 use flexarm_kinematics::Wrench;
 
@@ -9,7 +9,7 @@ const SMALLEST: f64 = 1e-9;
 /// Minimum fraction of an interval's change that a jump keeps when the interval is halved.
 const KEPT: f64 = 0.1;
 /// Number of halvings before the first check; the change of a smooth curve has decayed by then.
-const FIRST_LOOK: u32 = 8;
+const FIRST_CHECK: u32 = 8;
 
 /// Returns the times of jumps between `start` and `end` (s), to machine precision, at most one per
 /// interval.
@@ -22,6 +22,7 @@ pub(crate) fn jumps_of(wrench: &(dyn Fn(f64) -> Wrench + Send + Sync), start: f6
     let change = |a: f64, b: f64| (wrench(b).to_vector() - wrench(a).to_vector()).amax();
     let size = (0..=INTERVALS).map(|k| wrench(inner(k)).to_vector().amax()).fold(0.0, f64::max);
     let jump_in = |k: u32| {
+        // Halve towards the larger change: a jump keeps its size, a smooth curve loses half of it.
         let (mut a, mut b) = (inner(k), inner(k + 1));
         let whole = change(a, b);
         if !(whole.is_finite() && whole > SMALLEST * size) {
@@ -35,7 +36,7 @@ pub(crate) fn jumps_of(wrench: &(dyn Fn(f64) -> Wrench + Send + Sync), start: f6
             }
             (a, b) = if change(a, middle) >= change(middle, b) { (a, middle) } else { (middle, b) };
             halvings += 1;
-            if halvings == FIRST_LOOK && change(a, b) < KEPT * whole {
+            if halvings == FIRST_CHECK && change(a, b) < KEPT * whole {
                 return None;
             }
         }

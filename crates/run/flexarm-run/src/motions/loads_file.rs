@@ -20,7 +20,7 @@ use toml::Spanned;
 
 use crate::caveat::{self, Finding};
 use crate::error::Error;
-use crate::motions::applied_load::AppliedLoad;
+use crate::motions::applied_load::{AppliedLoad, interpolated};
 use crate::motions::load_jumps::jumps_of;
 use crate::motions::payload::PayloadChange;
 use crate::ranges::{OF_LOADS, USUAL_OF_LOADS, judged};
@@ -148,7 +148,12 @@ pub(crate) fn read_loads(path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>
     parse_loads(&read_text(path)?, path, duration)
 }
 
-/// As `read_loads`, from the text of the file.
+/// Reads loads and payloads from the text of a file, for a run that ends at `duration` (s).
+///
+/// * `path`: place of the file in messages; tables of loads are relative to its folder.
+///
+/// # Errors
+/// [`Error`] with file, location, the value found and the expected one.
 pub fn parse_loads(text: &str, path: &Path, duration: f64) -> Result<(Vec<AppliedLoad>, Vec<PayloadChange>), Error> {
     let source = Source::new(path, text, "loads");
     let file: LoadsFile = parsed(text, &source, OF_LOADS, |file: &LoadsFile| &file.format)?;
@@ -169,6 +174,7 @@ pub fn parse_loads(text: &str, path: &Path, duration: f64) -> Result<(Vec<Applie
     Ok((loads, payloads.collect()))
 }
 
+/// Converts a load; whether its frame exists is checked later.
 fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Source) -> Result<AppliedLoad, Error> {
     let e = entry.get_ref();
     let axes = axes(entry, source)?;
@@ -186,6 +192,7 @@ fn load(entry: &Spanned<LoadEntry>, folder: &Path, duration: f64, source: &Sourc
     Ok(AppliedLoad { written: Some(written), findings: findings(e), ..load })
 }
 
+/// Returns the axes in which a load acts.
 fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFileError> {
     let axes = entry.get_ref().axes.as_ref();
     match axes.map(|axes| axes.get_ref().as_str()) {
@@ -201,7 +208,7 @@ fn axes(entry: &Spanned<LoadEntry>, source: &Source) -> Result<LoadAxes, RobotFi
 /// Caveats about angles that look like degrees (the phase of a sine, arguments of sin and cos in
 /// expressions), and about unusual numbers.
 fn findings(e: &LoadEntry) -> Vec<Finding> {
-    let doubtful = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
+    let angles = sines_of(e).filter_map(|(text, rate, phase)| caveat::loads::of_sine(&text, rate, phase));
     let numbers = [
         ("duration", &e.duration),
         ("spindle_rpm", &e.spindle_rpm),
@@ -213,7 +220,7 @@ fn findings(e: &LoadEntry) -> Vec<Finding> {
     let numbers = numbers.chain(e.teeth.map(|teeth| ("teeth", f64::from(teeth))));
     let unusual =
         numbers.flat_map(|(key, number)| judged(&format!("load.{key}"), number, USUAL_OF_LOADS).collect::<Vec<_>>());
-    caveat::loads::of_phase(e.phase).into_iter().chain(unusual).chain(doubtful).collect()
+    caveat::loads::of_phase(e.phase).into_iter().chain(unusual).chain(angles).collect()
 }
 
 /// The sines and cosines in all expressions of a load; see [`sines`].
@@ -279,6 +286,7 @@ struct Reading<'a> {
 }
 
 impl Reading<'_> {
+    /// Returns the curve of the entry's kind.
     fn curve(&self, folder: &Path, duration: f64) -> Result<Curve, Error> {
         let kind = &self.entry.get_ref().kind;
         match kind.get_ref().as_str() {
@@ -449,45 +457,29 @@ fn table(path: &Path) -> Result<(WrenchFn, Vec<f64>), Error> {
     if table.rows.len() < 2 {
         return Err(table.error(None, "a table of loads needs at least two rows").into());
     }
-    let mut rows: Vec<(f64, [f64; 6])> = Vec::new();
+    // Columns that are missing are zero.
+    let (mut times, mut F): (Vec<f64>, Vec<Wrench>) = (Vec::new(), Vec::new());
     for (k, values) in table.rows.iter().enumerate() {
         if let Some(empty) = values.iter().position(|value| value.is_nan()) {
             return Err(table.error(Some(k), format!("column {:?} is empty, expected a number", header[empty])).into());
         }
-        if rows.last().is_some_and(|(t, _)| *t >= values[0]) {
+        if times.last().is_some_and(|t| *t >= values[0]) {
             return Err(table.error(Some(k), format!("time {} s does not rise: sort the rows", values[0])).into());
         }
-        let mut row = [0.0; 6];
-        for (name, value) in header.iter().zip(values).skip(1) {
-            if let Some(k) = NAMES.iter().position(|n| n == name) {
-                row[k - 1] = *value;
-            }
-        }
-        rows.push((values[0], row));
+        let value = |name: &str| header.iter().rposition(|of| of == name).map_or(0.0, |column| values[column]);
+        let [fx, fy, fz, tx, ty, tz] = [1, 2, 3, 4, 5, 6].map(|c| value(NAMES[c]));
+        times.push(values[0]);
+        F.push(Wrench::new(Vector3::new(fx, fy, fz), Vector3::new(tx, ty, tz)));
     }
-    let bends = if rows.len() <= MAX_ROWS { &rows[..] } else { &[rows[0], rows[rows.len() - 1]][..] };
-    let bends = bends.iter().map(|(t, _)| *t).collect();
-    let wrench = Arc::new(move |t| {
-        let k = rows.partition_point(|(x, _)| *x <= t);
-        let between = |k: usize| {
-            let ((t0, a), (t1, b)) = (&rows[k - 1], &rows[k]);
-            let s = (t - t0) / (t1 - t0);
-            let at = |c: usize| a[c] + s * (b[c] - a[c]);
-            Wrench::new(Vector3::new(at(0), at(1), at(2)), Vector3::new(at(3), at(4), at(5)))
-        };
-        match k {
-            0 => Wrench::zeros(),
-            k if k < rows.len() => between(k),
-            k if t == rows[k - 1].0 => between(k - 1),
-            _ => Wrench::zeros(),
-        }
-    });
-    Ok((wrench, bends))
+    // The reference stepper stops at the kinks, or at the ends of a long table.
+    let bends = if times.len() <= MAX_ROWS { times.clone() } else { vec![times[0], times[times.len() - 1]] };
+    Ok((Arc::new(interpolated(times, F)), bends))
 }
 
 /// Component of an expression, and whether it depends on time.
 type Part = Option<(FlatEx<f64>, bool)>;
 
+/// Returns the wrench of an expression, zero outside its time interval.
 fn expression(e: &LoadEntry, source: &Source, (start, end): (f64, f64)) -> Result<WrenchFn, Error> {
     let texts = [&e.fx, &e.fy, &e.fz, &e.tx, &e.ty, &e.tz];
     if texts.iter().all(|t| t.is_none()) {

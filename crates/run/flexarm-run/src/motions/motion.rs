@@ -1,4 +1,8 @@
 //! Trajectories of a robot: joints in coordinate order, checked against its limits.
+//!
+//! Start at [`Motion::load`]; `Motion::of` fits a trajectory to a robot. SI units. Not here: formats
+//! of files (`motion_formats`), TCP paths (`tool_path`), mathematics of trajectories
+//! (`flexarm_trajectory`).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -55,6 +59,7 @@ pub struct HeldJoint {
     pub given: bool,
 }
 
+/// A trajectory as steppers see it.
 struct AlongTrajectory(Arc<Trajectory>);
 
 impl PrescribedMotion for AlongTrajectory {
@@ -104,6 +109,9 @@ impl Motion {
 
     /// As [`Motion::load_with`], with a text instead of the file's content, for waypoints and TCP
     /// paths.
+    ///
+    /// # Errors
+    /// As [`Motion::load_with`].
     pub fn load_text(path: &Path, text: Option<&str>, robot: &Robot, options: &MotionOptions) -> Result<Self, Error> {
         let model = robot.rigid_model()?;
         let Robot { hold, controller, .. } = robot;
@@ -154,6 +162,7 @@ impl Motion {
         Self::of(trajectory, Path::new(name), &*robot.rigid_model()?, &robot.hold)
     }
 
+    /// Reads a motion file for a robot, from `text` if it is given.
     fn read(path: &Path, cell: &Cell<'_>, options: &MotionOptions, text: Option<&str>) -> Result<Self, Error> {
         let Cell { model, hold, .. } = *cell;
         let actuated = &model.coordinates()[..model.n_actuated()];
@@ -169,16 +178,19 @@ impl Motion {
         Ok(Self { format, topic, samples, notes: caveats, tool_path: tool_path.map(Arc::new), ..motion })
     }
 
+    /// Fits a trajectory to a robot: joints in coordinate order, those that it does not name held.
     fn of(trajectory: Trajectory, path: &Path, model: &Model, hold: &[(String, f64)]) -> Result<Self, Error> {
         let actuated = &model.coordinates()[..model.n_actuated()];
-        let limits = limits(model);
         let names: Vec<&str> = actuated.iter().map(|c| c.joint.as_str()).collect();
+
+        // Joints of closed loops cannot be commanded; those of a gripper are left out.
         let dependent: Vec<&str> = model.dependent().iter().map(|c| c.joint.as_str()).collect();
         let moved: Vec<String> = trajectory.joints().iter().chain(trajectory.dropped_columns()).cloned().collect();
         refuse_dependent(path, &moved, &names, &dependent)?;
         let dropped = foreign_joints(trajectory.joints(), &names).map_err(|e| Error::motion(path, e.to_string()))?;
         let trajectory = trajectory.without_joints(&dropped);
-        let warnings = warnings(&trajectory, path);
+
+        // The other joints stay where the robot file says, or at the position closest to zero.
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
         let place = |c: &Coordinate| {
             let given = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
@@ -186,29 +198,38 @@ impl Motion {
             HeldJoint { joint: c.joint.clone(), at, given: given.is_some() }
         };
         let held: Vec<HeldJoint> = still.map(place).collect();
+        let warnings = warnings(&trajectory, path);
         let named_held: Vec<(&str, f64)> = held.iter().map(|held| (held.joint.as_str(), held.at)).collect();
         let trajectory = trajectory.with_held_joints(&named_held)?;
         let trajectory = trajectory.with_joint_order(&names).map_err(|e| Error::motion(path, e.to_string()))?;
-        let violations = trajectory.check_limits(&limits);
-        let likely = caveat::motion::degrees(&violations, model);
-        let name = path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned());
-        let (path, trajectory) = (path.to_owned(), Arc::new(trajectory));
-        let (format, topic, samples, notes) = (String::new(), None, None, Vec::new());
+        let violations = trajectory.check_limits(&limits(model));
         Ok(Self {
-            name,
-            path,
-            trajectory,
+            name: path.file_stem().map_or_else(|| "trajectory".into(), |s| s.to_string_lossy().into_owned()),
+            path: path.to_owned(),
+            trajectory: Arc::new(trajectory),
+            likely: caveat::motion::degrees(&violations, model),
             violations,
-            likely,
             warnings,
             held,
-            format,
-            topic,
-            samples,
+            format: String::new(),
+            topic: None,
+            samples: None,
             dropped,
-            notes,
+            notes: Vec::new(),
             tool_path: None,
         })
+    }
+
+    /// Replaces the trajectory by one of the same joints.
+    fn with_trajectory(self, trajectory: Trajectory, model: &Model) -> Self {
+        let violations = trajectory.check_limits(&limits(model));
+        Self {
+            warnings: warnings(&trajectory, &self.path),
+            likely: caveat::motion::degrees(&violations, model),
+            violations,
+            trajectory: Arc::new(trajectory),
+            ..self
+        }
     }
 
     /// Scales the duration of the motion by `factor`, including pauses.
@@ -217,12 +238,8 @@ impl Motion {
     /// [`Error::Trajectory`] unless `factor` is positive, and if values overflow.
     pub fn scaled(self, factor: f64, model: &Model) -> Result<Self, Error> {
         let trajectory = self.trajectory.scaled(factor)?;
-        let warnings = warnings(&trajectory, &self.path);
-        let limits = limits(model);
-        let violations = trajectory.check_limits(&limits);
-        let likely = caveat::motion::degrees(&violations, model);
         // The planned moves are valid only at their own speed.
-        Ok(Self { trajectory: Arc::new(trajectory), violations, likely, warnings, tool_path: None, ..self })
+        Ok(Self { tool_path: None, ..self.with_trajectory(trajectory, model) })
     }
 
     /// Replaces each corner, where a velocity jumps, by a blend of duration `seconds`.
@@ -236,9 +253,7 @@ impl Motion {
             )));
         }
         let trajectory = self.trajectory.with_rounded_corners(seconds)?;
-        let warnings = warnings(&trajectory, &self.path);
-        let violations = trajectory.check_limits(&limits(model));
-        Ok(Self { trajectory: Arc::new(trajectory), violations, warnings, ..self })
+        Ok(self.with_trajectory(trajectory, model))
     }
 
     /// Returns the caveats about the motion.
@@ -248,6 +263,7 @@ impl Motion {
         self.notes.iter().cloned().chain(self.dropped_caveat()).chain(given).chain(self.held_caveats()).collect()
     }
 
+    /// Warns about joints that the robot does not have.
     fn dropped_caveat(&self) -> Option<Finding> {
         let file = self.path.display().to_string();
         let names: Vec<String> = self.dropped.iter().map(|name| format!("{name:?}")).collect();
@@ -279,6 +295,7 @@ impl Motion {
     }
 }
 
+/// Returns the warnings of a trajectory with its file.
 fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {
     trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect()
 }

@@ -1,5 +1,8 @@
 //! Table of the motion formats that can be read, one row each, recognised by content. A new format
 //! needs only a new row.
+//!
+//! Start at `read`. Not here: parsers of the formats (`flexarm_trajectory`, `flexarm_motion_io`,
+//! `flexarm_programs`), fitting to a robot (`motion`).
 
 use std::io::Read;
 use std::path::Path;
@@ -16,7 +19,7 @@ use crate::motions::tool_path::{Cell, ToolPath, is_path_file, read_path_file, re
 use flexarm_programs::recognise;
 
 /// Number of bytes used to recognise a file.
-const LOOKED_AT: u64 = 64 << 10;
+const HEAD_BYTES: u64 = 64 << 10;
 
 /// Options for reading a motion file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -40,6 +43,14 @@ pub(crate) struct ReadMotion {
     pub(crate) caveats: Vec<Finding>,
     /// Planned TCP path, if the motion is given as one.
     pub(crate) tool_path: Option<ToolPath>,
+}
+
+impl ReadMotion {
+    /// Returns a motion without topic, rows and messages about it.
+    fn plain(trajectory: Trajectory, format: String) -> Self {
+        let (dropped, caveats) = (Vec::new(), Vec::new());
+        Self { trajectory, format, topic: None, samples: None, dropped, caveats, tool_path: None }
+    }
 }
 
 /// Beginning of a file.
@@ -135,7 +146,7 @@ pub(crate) fn read(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
         if !path.is_file() {
             return Err(unreadable(path, std::io::Error::other("this is not a file")));
         }
-        let opened = std::fs::File::open(path).and_then(|open| open.take(LOOKED_AT).read_to_end(&mut bytes));
+        let opened = std::fs::File::open(path).and_then(|open| open.take(HEAD_BYTES).read_to_end(&mut bytes));
         opened.map_err(|source| unreadable(path, source))?;
     }
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase()).unwrap_or_default();
@@ -225,16 +236,7 @@ fn waypoints(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     no_topic(file, "waypoints")?;
     no_columns(file, "waypoints")?;
     let trajectory = Trajectory::parse_toml(&file.text()?, &file.path.display().to_string(), file.limits)?;
-    let format = "waypoints".to_owned();
-    Ok(ReadMotion {
-        trajectory,
-        format,
-        topic: None,
-        samples: None,
-        dropped: Vec::new(),
-        caveats: Vec::new(),
-        tool_path: None,
-    })
+    Ok(ReadMotion::plain(trajectory, "waypoints".to_owned()))
 }
 
 fn tool_path(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
@@ -253,8 +255,8 @@ fn robot_program(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
 }
 
 fn along((trajectory, tool_path): (Trajectory, ToolPath), format: String) -> ReadMotion {
-    let (samples, caveats) = (None, tool_path.caveats.clone());
-    ReadMotion { trajectory, format, topic: None, samples, dropped: Vec::new(), caveats, tool_path: Some(tool_path) }
+    let caveats = tool_path.caveats.clone();
+    ReadMotion { caveats, tool_path: Some(tool_path), ..ReadMotion::plain(trajectory, format) }
 }
 
 /// Returns the robot; a TCP path without one does not determine a joint motion.
@@ -269,16 +271,7 @@ fn table(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     let request = TableRequest { columns: file.options.columns.as_ref(), joints: file.joints };
     let (text, origin) = (text_of_file(file.path)?, file.path.display().to_string());
     let (trajectory, info) = Trajectory::parse_table(&text, &origin, &request)?;
-    let (format, samples) = (info.format, Some(info.rows));
-    Ok(ReadMotion {
-        trajectory,
-        format,
-        topic: None,
-        samples,
-        dropped: Vec::new(),
-        caveats: Vec::new(),
-        tool_path: None,
-    })
+    Ok(ReadMotion { samples: Some(info.rows), ..ReadMotion::plain(trajectory, info.format) })
 }
 
 fn messages(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {

@@ -1,5 +1,9 @@
 //! Report on a motion: peaks and limits, torques of the rigid robot, TCP path and curves; also
 //! converts the motion to other formats.
+//!
+//! Start at [`motion_report`]. SI units, joints in coordinate order, TCP in world axes. Not here:
+//! reading motions (`motion_formats`), the search for exceeded limits and the sentences about them
+//! (`flexarm_trajectory::LimitViolation`).
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +12,7 @@ use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_kinematics::{Data, Model, State, forward_kinematics, inverse_dynamics};
 use flexarm_motion_io::{TextFormat, write_joint_trajectory};
 use flexarm_settings::Setting;
-use flexarm_trajectory::{Extreme, JointLimits, JointPeak, LimitKind, Trajectory, TrajectoryError};
+use flexarm_trajectory::{Extreme, JointLimits, JointPeak, LimitKind, LimitViolation, Trajectory, TrajectoryError};
 use nalgebra::{DVector, Vector3};
 use serde::Serialize;
 
@@ -28,7 +32,7 @@ const SLACK: f64 = 1e-9;
 const JERK_SLACK: f64 = 1e-3;
 
 /// Result of `flexarm motion`. SI units; angles in rad.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct MotionReport {
     /// Path of the motion file.
     pub motion: String,
@@ -115,7 +119,7 @@ pub struct MotionPeak {
     pub torque_limit: Option<f64>,
 }
 
-/// An exceeded limit.
+/// An exceeded limit: a [`LimitViolation`] with its sentence.
 #[derive(Clone, Debug, Serialize)]
 pub struct MotionViolation {
     /// Joint name.
@@ -130,7 +134,7 @@ pub struct MotionViolation {
     pub value: f64,
     /// Limit.
     pub limit: f64,
-    /// The violation as a sentence.
+    /// `Display` of the [`LimitViolation`].
     pub message: String,
 }
 
@@ -201,20 +205,14 @@ fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajecto
         motion: path.display().to_string(),
         format,
         topic,
-        robot: None,
         joints: trajectory.joints().to_vec(),
-        held: Vec::new(),
         dropped,
         duration_s: trajectory.duration(),
         samples,
         peaks,
-        violations: Vec::new(),
-        tcp_length_m: None,
-        tcp_speed_m_s: None,
         warnings,
         notes,
-        files: MotionFiles::default(),
-        curves: Vec::new(),
+        ..MotionReport::default()
     };
     Ok((report, trajectory, Torques::default()))
 }
@@ -229,6 +227,7 @@ fn messages(caveats: &[caveat::Finding], own: Vec<String>) -> (Vec<String>, Vec<
     (warnings, text(notes))
 }
 
+/// Reports on a motion of a robot.
 fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(MotionReport, Trajectory, Torques), Error> {
     let motion = Motion::load_with(path, robot, options)?;
     let model = robot.rigid_model()?;
@@ -241,10 +240,10 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     caveats.extend(caveat::of_use::of_motion(&motion, &model).into_iter().filter(|caveat| !violations(caveat)));
     let (warnings, notes) = messages(&caveats, Vec::new());
 
-    let limit = |x: f64| x.is_finite().then_some(x);
+    // Peaks beside their limits. A path file may give jerk limits of its own.
     let limits = crate::motions::motion::limits(&model);
     let mut peaks = Vec::new();
-    let mut violations: Vec<MotionViolation> = motion.violations.iter().map(of_limit).collect();
+    let mut violations = motion.violations.clone();
     for (k, (peak, c)) in trajectory.peak().iter().zip(actuated).enumerate() {
         let worst = torques.peak(k);
         let (torque, torque_at_s) = (Some(worst.value), Some(worst.time_s));
@@ -253,10 +252,11 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
         let planned = motion.tool_path.as_ref().and_then(|path| path.jerk_of(&c.joint));
         violations.extend(planned.and_then(|limit| of_jerk(peak, limit)));
         let jerk_limit = planned.or(own.jerk_limit);
-        peaks.push(MotionPeak { torque, torque_at_s, torque_limit: limit(c.limits.effort), jerk_limit, ..own });
+        peaks.push(MotionPeak { torque, torque_at_s, torque_limit: finite(c.limits.effort), jerk_limit, ..own });
         violations.extend(torques.violation(k, &c.joint, c.limits.effort));
     }
-    let (length, speed) = way_of_tool(&trajectory, &model);
+    let violations = violations.iter().map(MotionViolation::from).collect();
+    let (length, speed) = length_and_speed_of_tcp(&trajectory, &model);
     let report = MotionReport {
         motion: path.display().to_string(),
         format: motion.format.clone(),
@@ -273,32 +273,36 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
         tcp_speed_m_s: Some(speed),
         warnings,
         notes,
-        files: MotionFiles::default(),
-        curves: Vec::new(),
+        ..MotionReport::default()
     };
     Ok((report, trajectory, torques))
 }
 
+/// Returns a limit, if there is one.
+fn finite(limit: f64) -> Option<f64> {
+    limit.is_finite().then_some(limit)
+}
+
+/// Returns the peaks of a joint beside its limits, without torques.
 fn of_joint(peak: &JointPeak, unit: &'static str, limits: &JointLimits) -> MotionPeak {
-    let limit = |x: f64| x.is_finite().then_some(x);
     MotionPeak {
         joint: peak.joint.clone(),
         unit,
         lower: peak.lower.value,
         lower_at_s: peak.lower.time_s,
-        lower_limit: limit(limits.lower),
+        lower_limit: finite(limits.lower),
         upper: peak.upper.value,
         upper_at_s: peak.upper.time_s,
-        upper_limit: limit(limits.upper),
+        upper_limit: finite(limits.upper),
         speed: peak.velocity.value,
         speed_at_s: peak.velocity.time_s,
-        speed_limit: limit(limits.velocity),
+        speed_limit: finite(limits.velocity),
         acceleration: peak.acceleration.value,
         acceleration_at_s: peak.acceleration.time_s,
-        acceleration_limit: limit(limits.acceleration),
+        acceleration_limit: finite(limits.acceleration),
         jerk: peak.jerk.value,
         jerk_at_s: peak.jerk.time_s,
-        jerk_limit: limit(limits.jerk),
+        jerk_limit: finite(limits.jerk),
         acceleration_jump: peak.acceleration_jump.value,
         torque: None,
         torque_at_s: None,
@@ -306,43 +310,27 @@ fn of_joint(peak: &JointPeak, unit: &'static str, limits: &JointLimits) -> Motio
     }
 }
 
-/// Converts a violated limit of a trajectory.
-pub fn of_limit(violation: &flexarm_trajectory::LimitViolation) -> MotionViolation {
-    let kind = match violation.kind {
-        LimitKind::Lower => "lower",
-        LimitKind::Upper => "upper",
-        LimitKind::Velocity => "velocity",
-        LimitKind::Acceleration => "acceleration",
-        LimitKind::Jerk => "jerk",
-    };
-    MotionViolation {
-        joint: violation.joint.clone(),
-        kind,
-        time_s: violation.time_s,
-        since_s: violation.since_s,
-        value: violation.value,
-        limit: violation.limit,
-        message: violation.to_string(),
+impl From<&LimitViolation> for MotionViolation {
+    fn from(violation: &LimitViolation) -> Self {
+        let LimitViolation { joint, kind, time_s, since_s, value, limit } = violation.clone();
+        let kind = match kind {
+            LimitKind::Lower => "lower",
+            LimitKind::Upper => "upper",
+            LimitKind::Velocity => "velocity",
+            LimitKind::Acceleration => "acceleration",
+            LimitKind::Jerk => "jerk",
+            LimitKind::Effort => "effort",
+        };
+        Self { joint, kind, time_s, since_s, value, limit, message: violation.to_string() }
     }
 }
 
 /// Returns a violation if the peak jerk exceeds its limit.
-fn of_jerk(peak: &JointPeak, limit: f64) -> Option<MotionViolation> {
+fn of_jerk(peak: &JointPeak, limit: f64) -> Option<LimitViolation> {
     let Extreme { time_s, value } = peak.jerk;
-    let message = format!(
-        "joint {:?}: jerk exceeds its limit {limit:.4}: {value:.4} at t = {time_s:.4} s; allow the move more time",
-        peak.joint
-    );
-    let (joint, since_s) = (peak.joint.clone(), time_s);
-    (value.abs() > limit * (1.0 + JERK_SLACK)).then_some(MotionViolation {
-        joint,
-        kind: "jerk",
-        time_s,
-        since_s,
-        value,
-        limit,
-        message,
-    })
+    let (joint, kind, since_s) = (peak.joint.clone(), LimitKind::Jerk, time_s);
+    let is_over = value.abs() > limit * (1.0 + JERK_SLACK);
+    is_over.then_some(LimitViolation { joint, kind, time_s, since_s, value, limit })
 }
 
 /// Torques of the rigid robot over time.
@@ -353,8 +341,8 @@ struct Torques {
     values: Vec<Vec<f64>>,
 }
 
-/// τ = M(q) q̈ + bias(q, q̇) at equal time intervals along the motion, and at each kink where the
-/// acceleration jumps.
+/// Computes τ = M(q) q̈ + bias(q, q̇) at equal time intervals along the motion, and at each kink where
+/// the acceleration jumps.
 fn torques(trajectory: &Trajectory, model: &Model) -> Torques {
     let n = model.nv();
     let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
@@ -372,6 +360,7 @@ fn torques(trajectory: &Trajectory, model: &Model) -> Torques {
 }
 
 impl Torques {
+    /// Returns the torque of largest magnitude of joint `k`.
     fn peak(&self, k: usize) -> Extreme {
         let zero = Extreme { time_s: 0.0, value: 0.0 };
         self.times.iter().zip(&self.values[k]).fold(zero, |worst, (&time_s, &value)| {
@@ -379,48 +368,48 @@ impl Torques {
         })
     }
 
-    fn violation(&self, k: usize, joint: &str, limit: f64) -> Option<MotionViolation> {
+    /// Returns a violation if joint `k` exceeds its limit.
+    fn violation(&self, k: usize, joint: &str, limit: f64) -> Option<LimitViolation> {
         let worst = self.peak(k);
         let over = |value: f64| value.abs() > limit * (1.0 + SLACK);
         let since = self.times.iter().zip(&self.values[k]).find(|(_, value)| over(**value)).map(|(t, _)| *t);
-        of_effort(joint, &worst, since.unwrap_or(worst.time_s), limit, "rigid robot with payload, no friction")
+        of_effort(joint, &worst, since.unwrap_or(worst.time_s), limit)
     }
 }
 
-/// Returns a violation if a torque or force exceeds its limit; `of` names its source.
-pub fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64, of: &str) -> Option<MotionViolation> {
+/// Returns a violation if a torque or force exceeds its limit (N m or N).
+///
+/// * `worst`: torque of largest magnitude. `since_s`: time at which the limit is first exceeded (s).
+/// * `limit`: no limit if infinite or NaN.
+pub fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64) -> Option<LimitViolation> {
     let Extreme { time_s, value } = *worst;
-    if value.abs() <= limit * (1.0 + SLACK) || limit.is_nan() {
-        return None;
-    }
-    let message = format!(
-        "joint {joint:?}: effort exceeds its limit {limit:.4}: {value:.4} at t = {time_s:.4} s, first passed at \
-         {since_s:.4} s (N m or N, {of}); allow the move more time"
-    );
-    Some(MotionViolation { joint: joint.to_owned(), kind: "effort", time_s, since_s, value, limit, message })
+    let (joint, kind) = (joint.to_owned(), LimitKind::Effort);
+    let is_over = value.abs() > limit * (1.0 + SLACK);
+    is_over.then_some(LimitViolation { joint, kind, time_s, since_s, value, limit })
 }
 
-/// Length of the TCP path (m) and maximum TCP speed (m/s), from chords. The length is extrapolated
+/// Computes the length of the TCP path (m) and the maximum TCP speed (m/s) from chords. The length is extrapolated
 /// from chords of one and two steps (error of fourth order in the step).
-fn way_of_tool(trajectory: &Trajectory, model: &Model) -> (f64, f64) {
+fn length_and_speed_of_tcp(trajectory: &Trajectory, model: &Model) -> (f64, f64) {
     let (mut data, tcp) = (Data::new(model), tcp_frame(model));
     let n = model.nv();
     let (mut q, mut v, mut a) = (DVector::zeros(n), vec![0.0; n], vec![0.0; n]);
     let step = trajectory.duration() / TIMES as f64;
-    let places: Vec<Vector3<f64>> = (0..=TIMES)
+    let p_WT: Vec<Vector3<f64>> = (0..=TIMES)
         .map(|i| {
             trajectory.sample(step * i as f64, q.as_mut_slice(), &mut v, &mut a);
             forward_kinematics(model, &mut data, &q);
             data.X_WF(&tcp).translation.vector
         })
         .collect();
-    let chords: Vec<f64> = places.windows(2).map(|pair| (pair[1] - pair[0]).norm()).collect();
+    let chords: Vec<f64> = p_WT.windows(2).map(|pair| (pair[1] - pair[0]).norm()).collect();
     let fine: f64 = chords.iter().sum();
-    let coarse: f64 = places.iter().step_by(2).zip(places.iter().skip(2).step_by(2)).map(|(p, q)| (q - p).norm()).sum();
+    let coarse: f64 = p_WT.iter().step_by(2).zip(p_WT.iter().skip(2).step_by(2)).map(|(p, q)| (q - p).norm()).sum();
     let speed = chords.iter().fold(0.0, |most: f64, chord| most.max(chord / step));
     (fine + (fine - coarse) / 3.0, speed)
 }
 
+/// Returns the positions of the joints at equal time intervals.
 fn curves(trajectory: &Trajectory) -> Vec<MotionCurve> {
     let sampled = sampled(trajectory, CURVE_POINTS);
     let curve = |(k, joint): (usize, &String)| MotionCurve {
@@ -430,7 +419,7 @@ fn curves(trajectory: &Trajectory) -> Vec<MotionCurve> {
     trajectory.joints().iter().enumerate().map(curve).collect()
 }
 
-/// Times, positions and velocities at equal time intervals.
+/// Returns times, positions and velocities at equal time intervals.
 fn sampled(trajectory: &Trajectory, points: usize) -> Vec<(f64, Vec<f64>, Vec<f64>)> {
     let n = trajectory.joints().len();
     let mut a = vec![0.0; n];
@@ -445,6 +434,13 @@ fn sampled(trajectory: &Trajectory, points: usize) -> Vec<(f64, Vec<f64>, Vec<f6
 
 /// Converts a motion to the formats given by the file extensions: `.csv`, `.toml`, `.yaml`
 /// (`.yml`), `.json`.
+///
+/// * `rate_hz`: rows or points per second.
+///
+/// Returns each path with its text.
+///
+/// # Errors
+/// [`Error::Value`] for another extension, [`Error::Trajectory`] for an invalid rate.
 pub fn motion_texts(
     outputs: &[PathBuf],
     trajectory: &Trajectory,
@@ -456,6 +452,9 @@ pub fn motion_texts(
 }
 
 /// Rejects files whose extension is not a motion format.
+///
+/// # Errors
+/// [`Error::Value`] for the first of them.
 pub fn check_motion_outputs(outputs: &[PathBuf]) -> Result<(), Error> {
     outputs.iter().try_for_each(|output| Target::of_motion(output).map(|_| ()))
 }
@@ -501,6 +500,7 @@ impl Target {
         }
     }
 
+    /// Returns the content of the file.
     fn text(
         self,
         report: &MotionReport,
@@ -537,6 +537,7 @@ fn plot(report: &MotionReport, trajectory: &Trajectory, torques: &Torques) -> Re
     let sampled = sampled(trajectory, 2 * CURVE_POINTS);
     let x: Vec<f64> = sampled.iter().map(|(t, ..)| *t).collect();
     let mut panels: Vec<Panel> = Vec::new();
+    // Curves with the same label share a panel.
     let mut put = |label: String, name: &str, x: Vec<f64>, y: Vec<f64>| {
         let curve = PlotCurve { name: name.to_owned(), look: CurveLook::Plain, x, y };
         match panels.iter_mut().find(|panel| panel.label == label) {
@@ -544,24 +545,18 @@ fn plot(report: &MotionReport, trajectory: &Trajectory, torques: &Torques) -> Re
             None => panels.push(Panel { label, logarithmic: false, legend: true, curves: vec![curve] }),
         }
     };
+    // Positions of all joints, then their speeds, then their torques: panels in this order.
+    let shown = |unit: &'static str| if unit == "rad" { ("deg", 1f64.to_degrees()) } else { (unit, 1.0) };
     for (k, peak) in report.peaks.iter().enumerate() {
-        let (unit, factor) = if peak.unit == "rad" { ("deg", 1f64.to_degrees()) } else { (peak.unit, 1.0) };
-        put(
-            format!("position [{unit}]"),
-            &peak.joint,
-            x.clone(),
-            sampled.iter().map(|(_, q, _)| factor * q[k]).collect(),
-        );
+        let (unit, factor) = shown(peak.unit);
+        let y = sampled.iter().map(|(_, q, _)| factor * q[k]).collect();
+        put(format!("position [{unit}]"), &peak.joint, x.clone(), y);
     }
     for (k, peak) in report.peaks.iter().enumerate() {
-        let (unit, factor) = if peak.unit == "rad" { ("deg", 1f64.to_degrees()) } else { (peak.unit, 1.0) };
-        let per_s = if unit == "rad or m" { "(rad or m)" } else { unit };
-        put(
-            format!("speed [{per_s}/s]"),
-            &peak.joint,
-            x.clone(),
-            sampled.iter().map(|(.., v)| factor * v[k]).collect(),
-        );
+        let (unit, factor) = shown(peak.unit);
+        let unit = if unit == "rad or m" { "(rad or m)" } else { unit };
+        let y = sampled.iter().map(|(.., v)| factor * v[k]).collect();
+        put(format!("speed [{unit}/s]"), &peak.joint, x.clone(), y);
     }
     for (k, values) in torques.values.iter().enumerate() {
         let unit = if report.peaks[k].unit == "m" { "force [N]" } else { "torque [N m]" };

@@ -1,4 +1,7 @@
 //! Payloads that are picked up and put down during a run.
+//!
+//! Start at [`PayloadChange::attach`]. Frames: L carrying link, B its body; kg, m, kg m². Not here: the
+//! robot's own payload (`robot`), files (`loads_file`).
 
 use flexarm_kinematics::{LinkInertia, Model, Pose, SpatialInertia};
 use flexarm_settings::{Quantity, known_names};
@@ -56,6 +59,7 @@ impl PayloadChange {
     pub(crate) fn on(&self, robot: &Robot, model: &Model, earlier: &[InertiaChange]) -> Result<InertiaChange, Error> {
         let fail = |cause: &str| LoadLocation::entry(self.written.as_ref(), cause);
         let LinkInertia { mass, com, inertia_com } = &self.carried;
+        // The values themselves.
         let mut numbers = [self.at_s, *mass].into_iter().chain(com.iter().copied()).chain(inertia_com.iter().copied());
         if numbers.any(|x| !x.is_finite()) || *mass < 0.0 || self.at_s < 0.0 {
             return Err(fail("a payload needs a time and a mass of at least 0, and finite numbers"));
@@ -70,13 +74,17 @@ impl PayloadChange {
             .into_iter()
             .collect::<Result<(), _>>()
             .map_err(|cause| LoadLocation::entry(self.written.as_ref(), cause))?;
-        let (link, body, X_BF) = self.carrier(robot, model)?;
+
+        // The link that carries it, and the tensor.
+        let (link, body, X_BL) = self.carrier(robot, model)?;
         if inertia_com.symmetric_eigenvalues().min() < -1e-9 * inertia_com.norm() {
             return Err(LoadLocation::inertia(
                 self.written.as_ref(),
                 "payload inertia has a negative principal moment; the order is ixx iyy izz ixy ixz iyz",
             ));
         }
+
+        // It replaces the robot's own payload, on one body during a run.
         let mut inertia = without_payload(robot, model, body)
             .ok_or_else(|| fail(&format!("the robot's own payload does not ride on link {link:?}: give that link")))?;
         if let Some(other) = earlier.iter().find(|c| c.body != body) {
@@ -84,7 +92,7 @@ impl PayloadChange {
             return Err(fail(&format!("payloads on two bodies ({first:?} and {link:?}): one changes in a run")));
         }
         if *mass > 0.0 {
-            inertia += self.carried.spatial().at_parent(&X_BF);
+            inertia += self.carried.spatial().at_parent(&X_BL);
         }
         Ok(InertiaChange { t: self.at_s, body, inertia })
     }

@@ -1,6 +1,8 @@
 //! Path files: TCP moves in TOML, recognised by the table `[path]`.
 //!
-//! Start at [`read_path_file`]. Docs: `docs/motions.md`.
+//! Start at [`read_path_file`]. Units become SI here. Frames: W controller's world, B base of the
+//! path, T tool, F flange. Docs: `docs/motions.md`. Not here: tables as written (`tables`), standard
+//! motions (`standard`), planning (`flexarm_path`).
 
 use std::path::Path;
 
@@ -38,6 +40,7 @@ struct Units {
     angle: f64,
 }
 
+/// Converts the tables of a file to moves.
 struct Reader<'a> {
     source: &'a Source,
     units: Units,
@@ -67,6 +70,7 @@ pub(crate) fn read_path_file(
     if *file.format.get_ref() != 1 {
         return Err(source.error(file.format.span(), "format must be 1").into());
     }
+    // The arm with the limits of the file, and the frames of the path.
     let units = units(&file.path, &source)?;
     let overrides = overrides(&file, &source, cell, units)?;
     let (arm, mut assumed) = cell.arm(&overrides);
@@ -86,6 +90,8 @@ pub(crate) fn read_path_file(
         arm: &arm,
         controller: cell.controller_axes(&arm.axes),
     };
+
+    // A robot program, a standard motion, or moves.
     if let Some(table) = &file.program {
         if file.standard.is_some() || !file.moves.is_empty() {
             let message = "[program] is a motion of its own: leave out [standard] and the [[move]]s, or it";
@@ -124,6 +130,7 @@ fn options(
         options.rule = match given.get_ref() {
             Redundancy::Word(word) if word == "hold" => None,
             Redundancy::Word(word) if word == "away-from-limits" => Some(NullSpaceRule::AwayFromLimits),
+            // A posture in the units of the file, for the joints that move the tool.
             Redundancy::Posture(values) if values.len() == arm.axes.len() && check_axes(values).is_ok() => {
                 let mut posture = arm.rest.clone();
                 for (value, &k) in values.iter().zip(&arm.axes) {
@@ -148,6 +155,7 @@ fn options(
     Ok(options)
 }
 
+/// Returns the units that the file declares.
 fn units(path: &PathTable, source: &Source) -> Result<Units, RobotFileError> {
     let length = match path.lengths.get_ref().as_str() {
         "m" => 1.0,
@@ -194,6 +202,7 @@ fn overrides(file: &PathFile, source: &Source, cell: &Cell<'_>, units: Units) ->
     Ok(overrides)
 }
 
+/// Returns the pose of a frame.
 fn frame_of(
     table: &FrameTable,
     units: Units,
@@ -230,7 +239,11 @@ fn rotation(
     }
 }
 
+/// Kinds of `[[move]]`.
+const KINDS: &str = "a move needs one of joints, joint_to, line, arc, spline, dwell";
+
 impl Reader<'_> {
+    /// Converts the `[[move]]`s.
     fn items(&self, moves: &[Spanned<MoveTable>]) -> Result<Vec<Item>, RobotFileError> {
         let mut items = Vec::new();
         // Orientation of the tool in the base at the end of the last move.
@@ -249,6 +262,7 @@ impl Reader<'_> {
         Ok(items)
     }
 
+    /// Returns the place of a table in the file.
     fn place<T>(&self, at: &Spanned<T>) -> Place {
         self.source.error(at.span(), "").place()
     }
@@ -266,7 +280,7 @@ impl Reader<'_> {
     /// Checks that a move has exactly one kind.
     fn only_one(&self, table: &Spanned<MoveTable>) -> Result<(), RobotFileError> {
         let entry = table.get_ref();
-        let said = [
+        let given = [
             ("joints", entry.joints.is_some()),
             ("joint_to", entry.joint_to.is_some()),
             ("line", entry.line.is_some()),
@@ -274,12 +288,10 @@ impl Reader<'_> {
             ("spline", entry.spline.is_some()),
             ("dwell", entry.dwell.is_some()),
         ];
-        let said: Vec<&str> = said.iter().filter(|(_, given)| *given).map(|(name, _)| *name).collect();
-        match said.as_slice() {
+        let given: Vec<&str> = given.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
+        match given.as_slice() {
             [_] => Ok(()),
-            [] => {
-                Err(self.source.error(table.span(), "a move needs one of joints, joint_to, line, arc, spline, dwell"))
-            }
+            [] => Err(self.source.error(table.span(), KINDS)),
             several => {
                 let message = format!("a move is one of {}: give one [[move]] for each", several.join(" and "));
                 Err(self.source.error(table.span(), message))
@@ -287,13 +299,17 @@ impl Reader<'_> {
         }
     }
 
+    /// Converts a move to one target.
+    ///
+    /// * `R`: orientation of the tool in B at the end of the last move; becomes that of this one.
     fn one(&self, table: &Spanned<MoveTable>, R: &mut Option<Rotation3<f64>>) -> Result<Move, RobotFileError> {
         let entry = table.get_ref();
+        // Joint values fix the pose; every other kind has a point and perhaps an orientation.
         let (word, kind, point) = if let Some(values) = &entry.joints {
-            let q: Vec<f64> = values.get_ref().iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect();
+            let q = self.joint_values(values.get_ref());
             *R = Some(self.orientation_at(&q, values)?);
-            let said = format!("joints = {:?}", values.get_ref());
-            return Ok(self.of(table, &said, MoveKind::Joint, Target::Joints(q)));
+            let statement = format!("joints = {:?}", values.get_ref());
+            return Ok(self.of(table, &statement, MoveKind::Joint, Target::Joints(q)));
         } else if let Some(point) = &entry.joint_to {
             ("joint_to", MoveKind::Joint, point)
         } else if let Some(point) = &entry.line {
@@ -310,10 +326,10 @@ impl Reader<'_> {
             };
             ("arc", kind, point)
         } else {
-            return Err(self
-                .source
-                .error(table.span(), "a move needs one of joints, joint_to, line, arc, spline, dwell"));
+            return Err(self.source.error(table.span(), KINDS));
         };
+
+        // The orientation stays until a move gives another one.
         let quaternion = entry.quaternion.as_ref().map(|q| *q.get_ref());
         let given = self.orientation(table, entry.rpy, quaternion)?;
         let turned = given.or(*R).ok_or_else(|| {
@@ -324,14 +340,14 @@ impl Reader<'_> {
         *R = Some(turned);
         let p = Vector3::from(*point.get_ref()) * self.units.length;
         let near = entry.near.as_ref();
-        let configuration = near.map_or(Configuration::Nearest, |values| {
-            Configuration::Near(values.iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect())
-        });
+        let configuration =
+            near.map_or(Configuration::Nearest, |values| Configuration::Near(self.joint_values(values)));
         let X_BT = Pose::from_parts(Translation3::from(p), turned);
-        let said = format!("{word} = {:?}", point.get_ref());
-        Ok(self.of(table, &said, kind, Target::Pose { X_BT, configuration }))
+        let statement = format!("{word} = {:?}", point.get_ref());
+        Ok(self.of(table, &statement, kind, Target::Pose { X_BT, configuration }))
     }
 
+    /// Adds a move to each point of a spline; only the last one may stop.
     fn spline(
         &self,
         table: &Spanned<MoveTable>,
@@ -341,6 +357,7 @@ impl Reader<'_> {
     ) -> Result<(), RobotFileError> {
         let n = points.get_ref().len();
         for (k, point) in points.get_ref().iter().enumerate() {
+            // Points of three values keep the orientation.
             let turned = match point.len() {
                 3 => *R,
                 6 => rotation(Some([point[3], point[4], point[5]]), None, self.units).unwrap_or_default(),
@@ -375,12 +392,15 @@ impl Reader<'_> {
         resolution: &PathOptions,
         notes: Vec<String>,
     ) -> Result<(Trajectory, ToolPath), Error> {
+        // The program is next to this file.
         let entry = table.get_ref();
         let file = self.source.path.parent().unwrap_or(Path::new("")).join(entry.file.get_ref());
         if !file.is_file() {
             let message = format!("there is no program {}", file.display());
             return Err(self.source.error(entry.file.span(), message).into());
         }
+
+        // What the program leaves undefined.
         let R = self.orientation(table, entry.rpy, entry.quaternion)?;
         let mut gcode = GCodeOptions {
             offsets: WORK_FRAMES.iter().map(|code| ((*code).to_owned(), self.X_WB)).collect(),
@@ -395,10 +415,9 @@ impl Reader<'_> {
             let out = |error| self.source.error(table.span(), format!("rapid: {error}"));
             check_rate("the speed of rapids", "m/s", speed).map_err(out)?;
         }
-        let start = entry.start.as_ref();
         let options = ReadOptions {
             entry: entry.entry.clone(),
-            start: start.map(|q| q.iter().enumerate().map(|(k, value)| value * self.joint_unit(k)).collect()),
+            start: entry.start.as_ref().map(|values| self.joint_values(values)),
             given: entry.given.clone().into_iter().collect(),
             waits_are_over: entry.waits_are_over,
             endless_passes: entry.endless_passes,
@@ -406,6 +425,8 @@ impl Reader<'_> {
             ..ReadOptions::default()
         };
         let bytes = flexarm_trajectory::bytes_of_file(&file)?;
+
+        // The arm with the axes of the controller, at the start of the program.
         let mut arm = self.arm.clone();
         arm.controller.clone_from(&self.controller);
         if let Some(start) = &options.start {
@@ -442,6 +463,7 @@ impl Reader<'_> {
         }
     }
 
+    /// Converts a standard motion to moves and rests.
     fn standard(&self, table: &Spanned<StandardTable>) -> Result<Vec<Item>, RobotFileError> {
         let entry = table.get_ref();
         let place = self.place(table);
@@ -464,9 +486,7 @@ impl Reader<'_> {
                 Step::To(kind, X_BT) => (kind, X_BT),
             };
             let configuration = match (&entry.near, &kind) {
-                (Some(values), MoveKind::Joint) => {
-                    Configuration::Near(values.iter().enumerate().map(|(k, v)| v * self.joint_unit(k)).collect())
-                }
+                (Some(values), MoveKind::Joint) => Configuration::Near(self.joint_values(values)),
                 _ => Configuration::Nearest,
             };
             // The halves of a circle are joined without a stop.
@@ -480,10 +500,13 @@ impl Reader<'_> {
         Ok(steps.into_iter().enumerate().map(item).collect())
     }
 
-    /// Returns the unit of a value of the controller's axis `k`.
-    fn joint_unit(&self, k: usize) -> f64 {
-        let coordinate = self.arm.axes.get(k).map(|&k| &self.arm.model.coordinates()[k]);
-        if coordinate.is_some_and(|c| c.slides()) { self.units.length } else { self.units.angle }
+    /// Converts values of the controller's axes to SI units.
+    fn joint_values(&self, values: &[f64]) -> Vec<f64> {
+        let unit = |k: usize| {
+            let coordinate = self.arm.axes.get(k).map(|&k| &self.arm.model.coordinates()[k]);
+            if coordinate.is_some_and(|c| c.slides()) { self.units.length } else { self.units.angle }
+        };
+        values.iter().enumerate().map(|(k, value)| value * unit(k)).collect()
     }
 
     /// Returns the orientation of the tool in the base at joint values.
@@ -504,6 +527,7 @@ impl Reader<'_> {
         Ok((self.arm.X_MW * self.X_WB).rotation.inverse() * X.rotation)
     }
 
+    /// Builds a move; speed and blend are those of the table.
     fn of(&self, table: &Spanned<MoveTable>, statement: &str, kind: MoveKind, to: Target) -> Move {
         let entry = table.get_ref();
         let place = self.place(table);
@@ -529,6 +553,7 @@ impl Reader<'_> {
         }
     }
 
+    /// Returns the blend at the end of a move, by default that of `[path]`.
     fn blend(&self, given: Option<f64>) -> Blend {
         match given.or(self.common.blend) {
             None | Some(0.0) => Blend::Stop,

@@ -1,7 +1,9 @@
 //! Motions given as TCP paths: a program of moves and a robot become joint trajectories.
 //!
 //! `file` reads flexarm's own path files; robot programs are read elsewhere into a [`Program`].
-//! Both end in `ToolPath::plan`.
+//! Both end in `ToolPath::plan`. Frames: W controller's world, M model's world, F flange, T tool; SI
+//! units. Not here: languages (`flexarm-programs`), inverse kinematics and time laws
+//! (`flexarm-path`).
 
 mod file;
 mod program;
@@ -74,12 +76,12 @@ pub struct Assumed {
     pub(crate) flange: Option<String>,
     pub(crate) accelerations: Option<String>,
     /// A limit that does not suit the others.
-    pub(crate) odd: Option<String>,
+    pub(crate) inconsistent: Option<String>,
 }
 
 impl Assumed {
     pub(crate) fn warnings(self) -> Vec<String> {
-        self.flange.into_iter().chain(self.accelerations).chain(self.odd).collect()
+        self.flange.into_iter().chain(self.accelerations).chain(self.inconsistent).collect()
     }
 }
 
@@ -116,13 +118,13 @@ impl<'a> Cell<'a> {
         (flange, X_FT, note)
     }
 
-    /// Pose of the controller's world in the model's: that of the link `base` if it does not move.
+    /// Returns `X_MW`, the pose of the controller's world in the model's: that of the link `base` if it does not move.
     fn world(&self) -> Pose {
         let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
         base.map_or_else(Pose::identity, |frame| frame.X_BF)
     }
 
-    /// Coordinates at rest before the program.
+    /// Returns the coordinates before the program (rad or m).
     fn rest(&self) -> DVector<f64> {
         let coordinates = self.model.coordinates();
         DVector::from_fn(self.model.nv(), |k, _| {
@@ -147,12 +149,15 @@ impl<'a> Cell<'a> {
         if self.controller.is_empty() { Vec::new() } else { axes.iter().map(axis).collect() }
     }
 
-    /// Returns the arm as seen by the program's controller.
+    /// Returns the arm as the program's controller has it, and what had to be assumed.
+    ///
+    /// * `overrides`: limits by coordinate that replace those of the robot.
     pub fn arm(&self, overrides: &Overrides) -> (ProgramArm<'a>, Assumed) {
         let (flange, X_FT, flange_note) = self.flange();
         let mut assumed = false;
         let of = |list: &[Option<f64>], k: usize| list.get(k).copied().flatten();
         let finite = |limit: f64| limit.is_finite().then_some(limit);
+        // Limits of each joint: the override, else the robot's, else an assumption.
         let bounds = (0..self.model.nv())
             .map(|k| {
                 let limits = &self.model.coordinates()[k].limits;
@@ -167,7 +172,7 @@ impl<'a> Cell<'a> {
                 JointBounds { velocity, acceleration, torque, jerk }
             })
             .collect();
-        let odd = self.model.coordinates().iter().zip(&bounds).find_map(|(c, of): (_, &JointBounds)| {
+        let inconsistent = self.model.coordinates().iter().zip(&bounds).find_map(|(c, of): (_, &JointBounds)| {
             let jerk = of.jerk.unwrap_or(f64::INFINITY);
             let limits = MotionLimits { velocity: of.velocity, acceleration: of.acceleration, jerk };
             Some(limits.odd(&c.joint, c.limits.velocity)?.to_string())
@@ -183,12 +188,15 @@ impl<'a> Cell<'a> {
         let controller = Vec::new();
         let arm =
             ProgramArm { model: self.model, flange, X_FT, X_MW, axes, controller, bounds, rest, starts_at_rest: false };
-        (arm, Assumed { flange: flange_note, accelerations, odd })
+        (arm, Assumed { flange: flange_note, accelerations, inconsistent })
     }
 }
 
 impl ToolPath {
     /// Plans the joint trajectory of a program; `warnings` are those found earlier.
+    ///
+    /// # Errors
+    /// [`Error::Path`] with the statement that the arm cannot follow.
     pub(crate) fn plan(
         file: &Path,
         program: &Program,
@@ -205,6 +213,8 @@ impl ToolPath {
                 program.notes.iter().take(MAX_NOTES).map(|note| placed(&note.location, &note.message)).collect();
             Error::Path { finding, notes }
         })?;
+
+        // Warnings by subject, a few of each kind; then the notes of the program.
         let file = file.display().to_string();
         let mut warnings: Vec<Finding> = warnings.iter().map(|text| warning(&file, text)).collect();
         let stops = planned.stops.iter().map(|(place, why)| warning(place, format!("no blend: {why}"))).collect();
@@ -250,6 +260,7 @@ fn placed(place: impl Display, text: impl Display) -> String {
     format!("{place}: {text}")
 }
 
+/// Returns a warning with its place.
 fn warning(place: impl Display, text: impl Display) -> Finding {
     Finding::warning("tool-path", place.to_string(), placed(&place, text), "")
 }
@@ -372,6 +383,7 @@ fn speed_warnings(program: &Program) -> Vec<Finding> {
     speeds.chain(blend).collect()
 }
 
+/// Warns about a move that is slower than programmed.
 fn slowed_warning(of: &PlannedMove, slowed: &Slowed) -> Finding {
     let by = match &slowed.by {
         SlowedBy::JointSpeed(joint) => format!("the speed of joint {joint:?}"),

@@ -1,4 +1,7 @@
 //! Robot programs as motions: read by `flexarm-programs`, planned for a robot.
+//!
+//! Start at [`read_robot_program`]. Not here: the languages (`flexarm-programs`), planning
+//! (`flexarm-path`).
 
 use std::path::{Path, PathBuf};
 
@@ -36,7 +39,12 @@ pub(crate) fn read_robot_program(
     Ok((planned, recognise(&bytes, &name).map_or("", |language| language.name())))
 }
 
-/// Reads a program with the locations of its targets; `companions` replace further files on disk.
+/// Reads a program with the locations of its targets, for writing it with other ones.
+///
+/// * `companions`: replace further files on disk, such as `.dat` of a KUKA program.
+///
+/// # Errors
+/// [`Error::Program`] with line and statement.
 pub fn program_text(
     path: &Path,
     bytes: &[u8],

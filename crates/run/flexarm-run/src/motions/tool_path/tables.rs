@@ -1,4 +1,6 @@
-//! Tables of a path file, as written.
+//! Tables of a path file, as written, in the units that the file declares.
+//!
+//! `docs/motions.md` describes the keys. Not here: their conversion and checks (`file`).
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
