@@ -67,7 +67,7 @@ impl AxisMotion {
         }
     }
 
-    /// Pose of the child in the joint frame at the joint value (rad or m).
+    /// Pose `X_JB` of the child in the joint frame at the joint value (rad or m).
     pub fn pose(self, value: f64) -> Pose {
         match self {
             Self::Revolute(axis) => {
@@ -108,7 +108,7 @@ impl AxisMotion {
         }
     }
 
-    /// `S q̇` in B axes, at Bo.
+    /// `V_PB_B = S q̇` at Bo, for the rate q̇ (rad/s or m/s).
     #[inline(always)]
     pub fn twist<T: Real>(self, rate: T) -> Twist<T> {
         self.linear(
@@ -119,7 +119,7 @@ impl AxisMotion {
         )
     }
 
-    /// `Sᵀ F` (N m or N) of a wrench at Bo in B axes.
+    /// `Sᵀ F`: generalised force (N m or N) of the wrench `F_Bo_B`.
     #[inline(always)]
     pub fn project<T: Real>(self, F: &Wrench<T>) -> T {
         self.linear(
@@ -130,7 +130,7 @@ impl AxisMotion {
         )
     }
 
-    /// `S` as a 6-vector in the axes J of the joint, linear part first.
+    /// `S = [l; a]` as a 6-vector in the axes J of the joint, linear part first (m/rad or 1; 1 or 0).
     pub fn column(self) -> Vector6<f64> {
         self.linear(
             |axis| Vector6::new(0.0, 0.0, 0.0, axis.x, axis.y, axis.z),
@@ -156,12 +156,12 @@ fn shifted<T: Real>(X_PJ: &Pose, travel: &Vector3<f64>, value: T) -> Vector3<T> 
     scaled(&lift(&mul(X_PJ.rotation.matrix(), travel)), value)
 }
 
-/// `R_PB(q) = K0 + sin q K1 + cos q K2`: Rodrigues' formula including the joint placement.
+/// `R_PB(q) = R_0 + sin q R_1 + cos q R_2`: Rodrigues' formula including the joint placement.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RevoluteTable {
-    K0: Matrix3<f64>,
-    K1: Matrix3<f64>,
-    K2: Matrix3<f64>,
+    R_0: Matrix3<f64>,
+    R_1: Matrix3<f64>,
+    R_2: Matrix3<f64>,
 }
 
 impl RevoluteTable {
@@ -169,12 +169,12 @@ impl RevoluteTable {
     pub(crate) fn new(X_PJ: &Pose, axis_J: &Vector3<f64>) -> Self {
         let (R, A) = (X_PJ.rotation.matrix(), skew(axis_J));
         let A2 = axis_J * axis_J.transpose() - Matrix3::identity();
-        Self { K0: R + R * A2, K1: R * A, K2: -(R * A2) }
+        Self { R_0: R + R * A2, R_1: R * A, R_2: -(R * A2) }
     }
 
     /// `R_PB` for sine and cosine of the joint angle.
     #[inline(always)]
     pub(crate) fn at<T: Real>(&self, sine: T, cosine: T) -> Matrix3<T> {
-        add3(&add3(&lift3(&self.K0), &scaled3(&lift3(&self.K1), sine)), &scaled3(&lift3(&self.K2), cosine))
+        add3(&add3(&lift3(&self.R_0), &scaled3(&lift3(&self.R_1), sine)), &scaled3(&lift3(&self.R_2), cosine))
     }
 }

@@ -72,14 +72,14 @@ pub use flexarm_spatial::products;
 pub use aba::{Roles, forward_dynamics, hybrid_dynamics};
 pub use analytic_ik::{
     AXIS_TOLERANCE, AXIS_TOLERANCE_RAD, AnalyticArm, ArmClass, Branch, ControllerAxes, Miss, NoAnalyticIk,
-    POSE_TOLERANCE, PositionForm, Selection, Solution, Solutions, abb_quadrant, kuka_turn,
+    POSE_TOLERANCE, PositionForm, Selection, Solution, Solutions, kuka_turn,
 };
 pub use axis_motion::AxisMotion;
 pub use balancer::{
     Balancer, BalancerCurve, BalancerCurveError, BalancerLaw, BalancerLine, BalancerPlace, BalancerSpan, GasLaw,
     PlacedBalancer,
 };
-pub use closure::{LOOP_AXIS_TOLERANCE_RAD, LoopClosure, PlacedLoop};
+pub use closure::{LoopClosure, PlacedLoop};
 pub use crba::{mass_matrix, mass_matrix_at_poses};
 pub use data::{Data, State};
 pub use energy::{
@@ -101,5 +101,5 @@ pub use static_tangent::{PointLoad, StaticTangent};
 /// Kernels, for the tests of this crate.
 #[doc(hidden)]
 pub mod internals {
-    pub use crate::analytic_ik::trig::{Fan, List, Roots, TrigPolynomial};
+    pub use crate::analytic_ik::trig::{CirclePlane, List, Roots, TrigPolynomial};
 }

@@ -47,6 +47,7 @@ pub fn inverse_kinematics_from_many_starts(
     starts: usize,
 ) -> Result<Vec<FoundSolution>, IkError> {
     model.check_size("q_start", q_start.len());
+    // Starts: the caller's, then `low + (high - low) frac(1/2 + k a_i)` in coordinate i.
     let chain = coordinates_of(model, frame);
     let steps = steps_of_recurrence(chain.len());
     let mut found: Vec<FoundSolution> = Vec::new();
@@ -59,6 +60,7 @@ pub fn inverse_kinematics_from_many_starts(
                 q[k] = low + (high - low) * (0.5 + number as f64 * step).fract();
             }
         }
+        // Keep each new solution, and the nearest failure for the message.
         match inverse_kinematics(model, data, frame, X_WT, &q, options) {
             Ok(q) => add(&mut found, q, model, &chain),
             Err(error) => {
@@ -125,6 +127,7 @@ fn steps_of_recurrence(n: usize) -> Vec<f64> {
     (1..=n).map(|k| x.powi(-(k as i32))).collect()
 }
 
+/// Counts a hit of a known solution, or appends a new one with its free turns in (-π, π].
 fn add(found: &mut Vec<FoundSolution>, mut q: DVector<f64>, model: &Model, chain: &[(usize, bool)]) {
     const SAME: f64 = 1e-5;
     let apart = |a: f64, b: f64, turns: bool| {

@@ -63,12 +63,12 @@ pub struct InterfaceShape {
 }
 
 impl ModalBody {
-    /// Number of modal coordinates.
+    /// Number n of modal coordinates.
     pub fn n(&self) -> usize {
         self.C_t.len()
     }
 
-    /// Mass properties in the undeformed state, about the link origin.
+    /// Mass properties `M_LLo_L` in the undeformed state, about the link origin.
     pub fn undeformed(&self) -> SpatialInertia {
         SpatialInertia { mass: self.mass, first_moment: self.first_moment, rotational: self.inertia }
     }

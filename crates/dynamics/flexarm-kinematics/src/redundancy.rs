@@ -5,8 +5,8 @@
 //! ```
 //! [`inverse_kinematics`] reaches the pose. Steps in the null space of the Jacobian, each followed
 //! by a return to the pose, then reduce the measure: `d = -N (Nᵀ W N)⁻¹ Nᵀ W (q - r)` with N a
-//! basis of the null space [Liégeois 1977]. Joints at a limit that a step would exceed are held.
-//! The result is a local minimum near the start.
+//! basis of the null space [Liégeois 1977]. Joints at a limit that a step would exceed stay there.
+//! The result is a local minimum near the start. Start at [`inverse_kinematics_with_rule`].
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, DVector, Matrix6xX};
@@ -61,43 +61,45 @@ pub fn inverse_kinematics_with_rule(
     rule: &NullSpaceRule,
 ) -> Result<RuledSolution, IkError> {
     let coordinates: Vec<usize> = coordinates_of(model, frame).into_iter().map(|(k, _)| k).collect();
-    let aim = Aim::new(model, rule, &coordinates);
+    let rule = Measure::new(model, rule, &coordinates);
     let mut q = inverse_kinematics(model, data, frame, X_WT, q_start, options)?;
-    let mut measure = aim.measure(&q);
+    let mut measure = rule.at(&q);
     for steps in 0..options.max_iterations {
-        let step = aim.step(model, data, frame, &q, options.characteristic_length_m);
+        let step = rule.step(model, data, frame, &q, options.characteristic_length_m);
         if step.amax() < 1e-8 {
             return Ok(RuledSolution { q, measure, steps, settled: true });
         }
-        let mut part = aim.largest_part(&q, &step).min(0.5 / step.amax()).min(1.0);
+        let mut part = rule.largest_part(&q, &step).min(0.5 / step.amax()).min(1.0);
         let mut next = None;
         while next.is_none() && part * step.amax() > 1e-9 {
             let trial = inverse_kinematics(model, data, frame, X_WT, &(&q + &step * part), options);
-            next = trial.ok().filter(|trial| aim.measure(trial) < measure);
+            next = trial.ok().filter(|trial| rule.at(trial) < measure);
             part *= 0.5;
         }
         // At rounding level no step improves the measure.
         let Some(next) = next else { return Ok(RuledSolution { q, measure, steps, settled: true }) };
         q = next;
-        measure = aim.measure(&q);
+        measure = rule.at(&q);
     }
     Ok(RuledSolution { q, measure, steps: options.max_iterations, settled: false })
 }
 
-/// Measure: middle, weight and limits of each coordinate that moves the frame.
-struct Aim {
-    items: Vec<AimedCoordinate>,
+/// `½ (q - r)ᵀ W (q - r)` over the coordinates that move the frame.
+struct Measure {
+    items: Vec<WeightedCoordinate>,
 }
 
-struct AimedCoordinate {
+struct WeightedCoordinate {
+    /// Coordinate.
     k: usize,
+    /// Entry of r and of the diagonal of W.
     middle: f64,
     weight: f64,
     lower: f64,
     upper: f64,
 }
 
-impl Aim {
+impl Measure {
     fn new(model: &Model, rule: &NullSpaceRule, coordinates: &[usize]) -> Self {
         if let NullSpaceRule::NearestTo(rest) = rule {
             assert_eq!(rest.len(), model.nv(), "the posture needs one value per coordinate");
@@ -110,27 +112,28 @@ impl Aim {
                 NullSpaceRule::AwayFromLimits if half.is_finite() && half > 0.0 => (limits.lower + half, half.powi(-2)),
                 NullSpaceRule::AwayFromLimits => (0.0, 0.0),
             };
-            AimedCoordinate { k, middle, weight, lower: limits.lower, upper: limits.upper }
+            WeightedCoordinate { k, middle, weight, lower: limits.lower, upper: limits.upper }
         };
         Self { items: coordinates.iter().map(item).collect() }
     }
 
-    fn measure(&self, q: &DVector<f64>) -> f64 {
+    fn at(&self, q: &DVector<f64>) -> f64 {
         self.items.iter().map(|i| 0.5 * i.weight * (q[i.k] - i.middle).powi(2)).sum()
     }
 
-    /// Null-space step, nv long; joints that it would push beyond their limits are held.
+    /// Null-space step, nv long; joints that it would push beyond their limits stay there.
     fn step(&self, model: &Model, data: &mut Data, frame: &Frame, q: &DVector<f64>, length: f64) -> DVector<f64> {
         forward_kinematics(model, data, q);
         let mut J = Matrix6xX::zeros(model.nv());
         frame_jacobian(model, data, frame, &mut J);
-        let mut free: Vec<&AimedCoordinate> = self.items.iter().collect();
+        let mut free: Vec<&WeightedCoordinate> = self.items.iter().collect();
         loop {
             let n = free.len();
             let Jf = DMatrix::from_fn(6, n, |r, c| J[(r, free[c].k)] / if r < 3 { length } else { 1.0 });
             let step = null_space_step(&Jf, &free, q);
-            let pushed =
-                |(i, d): (&&AimedCoordinate, &f64)| (q[i.k] <= i.lower && *d < 0.0) || (q[i.k] >= i.upper && *d > 0.0);
+            let pushed = |(i, d): (&&WeightedCoordinate, &f64)| {
+                (q[i.k] <= i.lower && *d < 0.0) || (q[i.k] >= i.upper && *d > 0.0)
+            };
             let Some(out) = free.iter().zip(step.iter()).position(pushed) else {
                 let mut all = DVector::zeros(model.nv());
                 for (i, d) in free.iter().zip(step.iter()) {
@@ -144,7 +147,7 @@ impl Aim {
 
     /// Fraction of the step up to the first limit.
     fn largest_part(&self, q: &DVector<f64>, step: &DVector<f64>) -> f64 {
-        let part = |i: &AimedCoordinate| match step[i.k] {
+        let part = |i: &WeightedCoordinate| match step[i.k] {
             d if d > 0.0 => (i.upper - q[i.k]) / d,
             d if d < 0.0 => (i.lower - q[i.k]) / d,
             _ => f64::INFINITY,
@@ -154,7 +157,7 @@ impl Aim {
 }
 
 /// `-N (Nᵀ W N)⁺ Nᵀ W (q - r)`.
-fn null_space_step(J: &DMatrix<f64>, free: &[&AimedCoordinate], q: &DVector<f64>) -> DVector<f64> {
+fn null_space_step(J: &DMatrix<f64>, free: &[&WeightedCoordinate], q: &DVector<f64>) -> DVector<f64> {
     let n = free.len();
     if n == 0 {
         return DVector::zeros(0);

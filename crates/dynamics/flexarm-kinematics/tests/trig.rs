@@ -1,6 +1,6 @@
 //! Equations in one angle: all roots, also near the ends of the range.
 
-use flexarm_kinematics::internals::{Fan, TrigPolynomial};
+use flexarm_kinematics::internals::{CirclePlane, TrigPolynomial};
 use nalgebra::Vector3;
 
 /// Truth: product of factors with known roots.
@@ -36,10 +36,10 @@ fn a_double_root_is_found_and_complex_ones_are_not() {
 #[test]
 fn a_vector_is_turned_to_a_cosine_without_loss_near_its_axis() {
     let (u, h) = (Vector3::z(), Vector3::y());
-    let fan = Fan::new(&u, &h, &u);
+    let equation = CirclePlane::new(&u, &h, &u);
     for d in [1e-12, 1e-7, 0.3, 2.0, std::f64::consts::PI - 1e-9] {
         let v = Vector3::new(d.sin() * 0.6, d.sin() * 0.8, d.cos());
-        let found = fan.angles(&u, &v).angles()[0];
+        let found = equation.angles(&u, &v).angles()[0];
         assert!((found - d).abs() < 1e-15 + 4e-16 * d, "{found} for {d}"); // measured 1.3e-23
     }
 }

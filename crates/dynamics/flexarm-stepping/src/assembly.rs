@@ -1,5 +1,6 @@
 //! Assembly of an arm: its springs on the model, loads, changes of inertia and servos, and with each
-//! the modes and the damping that depend on them.
+//! the modes and the damping that depend on them. Start at [`Plant::new`]. Not here: gear laws
+//! (`gear::setup`).
 
 use std::sync::Arc;
 
@@ -42,6 +43,7 @@ impl Plant {
         springs: Vec<S>,
         motion: Arc<dyn PrescribedMotion>,
     ) -> Result<Self, StepError> {
+        // One spring per elastic group, in the model's order.
         let groups = model.elastic();
         if springs.len() != groups.len() {
             return Err(StepError::Setup(format!(
@@ -52,6 +54,7 @@ impl Plant {
         }
         let elements = springs.into_iter().zip(groups).map(|(spring, group)| element(spring.into(), group));
         let elements = elements.collect::<Result<Vec<_>, _>>()?;
+        // Drives, loads and gear laws are added by the functions with `with_`.
         let n = model.n_elastic();
         Ok(Self {
             model,
@@ -237,6 +240,8 @@ impl Plant {
         own.map_or(0.0, |e| if let Damping::Modal(ratio) = e.damping { ratio } else { 0.0 })
     }
 
+    /// Adds `M Φ diag(2 ζ ω) Φᵀ M` to D; ζ of a mode is the mean of those of the elements, weighted by
+    /// their strain energy in the mode.
     fn add_modal_damping(&mut self, M: &DMatrix<f64>) {
         for (j, omega) in self.modes.omega.iter().enumerate() {
             let phi = self.modes.shapes.column(j);

@@ -1,7 +1,7 @@
 //! Parts of a drive: nonlinear springs, friction, and one axis of a sampled controller.
 //!
 //! Start at [`ServoAxis`], [`Friction`] and [`SpringCurve`]. All quantities are on the joint side
-//! of the gear. Not here: rotors (in the tree) and linear gearbox springs (elements of the arm).
+//! of the gear; `q` are all coordinates of the arm. Not here: rotors (in the tree) and linear gearbox springs (elements of the arm).
 
 use crate::guide::Guide;
 
@@ -33,7 +33,8 @@ impl SpringCurve {
         }
     }
 
-    /// Returns the slope at deflection `e` with the joints at `q`; 0 within backlash.
+    /// Returns the slope (N m/rad or N/m) at deflection `e` with the joints at `q`; 0 within
+    /// backlash.
     pub fn slope(&self, e: f64, q: &[f64]) -> f64 {
         match self {
             Self::Torque(curve) => curve.slope(e),
@@ -42,7 +43,7 @@ impl SpringCurve {
     }
 
     /// Returns the slope at deflection `e`, and within backlash the steepest slope.
-    pub fn slope_beyond_play(&self, e: f64, q: &[f64]) -> f64 {
+    pub(crate) fn slope_beyond_play(&self, e: f64, q: &[f64]) -> f64 {
         match self {
             Self::Torque(curve) if curve.slope(e) <= 0.0 => curve.stiffest(),
             _ => self.slope(e, q),
@@ -113,10 +114,9 @@ impl TorqueCurve {
                 ));
             }
         }
-        let ends = |slope: f64| slope > 0.0;
         let n = points.len();
         let slope = |a: [f64; 2], b: [f64; 2]| (b[1] - a[1]) / (b[0] - a[0]);
-        if !ends(slope(points[0], points[1])) || !ends(slope(points[n - 2], points[n - 1])) {
+        if slope(points[0], points[1]) <= 0.0 || slope(points[n - 2], points[n - 1]) <= 0.0 {
             return fail("a torque curve must rise at both ends: nothing else holds the joint".into());
         }
         Ok(Self { x: points.iter().map(|p| p[0]).collect(), y: points.iter().map(|p| p[1]).collect() })
@@ -137,7 +137,7 @@ impl TorqueCurve {
     /// Returns the sum with a spring of stiffness `stiffness` whose torque saturates beyond
     /// `± reach`.
     #[must_use]
-    pub fn with_slider(&self, stiffness: f64, reach: f64) -> Self {
+    pub(crate) fn with_slider(&self, stiffness: f64, reach: f64) -> Self {
         let mut x = self.x.clone();
         // The point at 0 makes the torque exactly zero at zero deflection.
         x.extend([-reach, 0.0, reach]);
@@ -156,12 +156,13 @@ impl TorqueCurve {
         Self { x: self.x.clone(), y: self.y.iter().map(|y| factor * y).collect() }
     }
 
+    /// Returns the number of the piece that contains `e`, from 0.
     fn piece(&self, e: f64) -> usize {
         let inner = &self.x[1..self.x.len() - 1];
         inner.iter().take_while(|x| e >= **x).count()
     }
 
-    /// Returns the torque at deflection `e`.
+    /// Returns the torque (N m or N) at deflection `e` (rad or m).
     pub fn torque(&self, e: f64) -> f64 {
         // Measured from the inner end of the first piece, which may be long: avoids round-off next
         // to backlash.
@@ -169,7 +170,7 @@ impl TorqueCurve {
         self.y[k] + self.slope(e) * (e - self.x[k])
     }
 
-    /// Returns the slope at deflection `e`.
+    /// Returns the slope (N m/rad or N/m) at deflection `e` (rad or m).
     pub fn slope(&self, e: f64) -> f64 {
         let k = self.piece(e);
         (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])
@@ -237,7 +238,7 @@ impl Friction {
         self.viscous * rate + (self.coulomb + rise) * (rate / self.regularisation).tanh()
     }
 
-    /// Returns the derivative of the torque with respect to the speed.
+    /// Returns the derivative of the torque with respect to the speed (N m s/rad).
     pub fn slope(&self, rate: f64) -> f64 {
         let (s, t) = (rate / self.stribeck_velocity, (rate / self.regularisation).tanh());
         let rise = self.stribeck * (-s * s).exp();
@@ -253,7 +254,7 @@ impl Friction {
 /// v_c = q̇_ref + position_gain (q_ref - q)
 /// τ   = velocity_gain (v_c - q̇) + integral_gain ∫ (v_c - q̇) dt + feed_forward τ_ff,   |τ| ≤ limit
 /// ```
-/// q is the motor angle on the joint side. τ is held until the next sample. τ_ff is the torque of
+/// q is the motor angle on the joint side. τ is constant until the next sample. τ_ff is the torque of
 /// the rigid robot on the reference motion, including rotor and friction. The integral stops while
 /// the torque is at its limit.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,8 @@
 //! V_B = Ad_BQ V_Q + S x'
 //! α = S^-1 V_B                  I = Sᵀ M_BBo S,   X = S_B^-1 Ad_BQ S_Q
 //! ```
-//! Q is the body behind the next elastic joint inward, S the motion subspace of B's own joint.
+//! Q is the body behind the next elastic joint inward, S the motion subspace of B's own joint. Start
+//! at [`ElasticTree::place`]. Not here: elimination along the tree (`tree_matrix`).
 
 use flexarm_kinematics::{Data, ElasticAngles, JointMotion, Model, Pose, SpatialInertia, State, skew};
 use nalgebra::{Matrix3, Matrix6};
@@ -118,7 +119,7 @@ impl ElasticTree {
     }
 }
 
-/// Returns the blocks `A`, `B`, `C` of `S_B^-1 Ad_BQ S_Q`.
+/// Returns the blocks `X_t`, `X_tr`, `X_r` of `S_B^-1 Ad_BQ S_Q`.
 fn motion(own: &ElasticJoint, B_inverse: &Matrix3<f64>, X_QB: &Pose, inner: &ElasticJoint) -> [Matrix3<f64>; 3] {
     let Rt = X_QB.rotation.matrix().transpose();
     let turn = own.L.transpose() * Rt;
@@ -161,16 +162,16 @@ impl Plant {
         }
     }
 
-    /// Writes the blocks of `c_D D + c_K K` and K for linear springs with six coordinates that are
+    /// Writes the blocks of `Z = c_D D + c_K K` and K for linear springs with six coordinates that are
     /// damped by element.
     pub(crate) fn blocks(&self, c_D: f64, c_K: f64, to: &mut TreeMatrices) {
         for (k, (node, element)) in to.nodes.iter_mut().zip(&self.elements).enumerate() {
             node.K.copy_from_slice(element.K.as_slice());
             if self.proportional {
-                node.C = node.K * (c_K + c_D * self.tau[k]);
+                node.Z = node.K * (c_K + c_D * self.tau[k]);
             } else {
                 let first = self.offset(element);
-                node.C = node.K * c_K + self.D.fixed_view::<6, 6>(first, first) * c_D;
+                node.Z = node.K * c_K + self.D.fixed_view::<6, 6>(first, first) * c_D;
             }
         }
     }

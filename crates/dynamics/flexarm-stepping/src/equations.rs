@@ -73,6 +73,10 @@ impl EquationsOfMotion {
     /// # Panics
     /// If a slice has another length than [`EquationsOfMotion::x`].
     pub fn set_state(&mut self, x: &[f64], v: &[f64]) {
+        for (what, found) in [("x", x.len()), ("v", v.len())] {
+            let expected = self.x.len();
+            assert!(found == expected, "{what} has {found} entries, the arm has {expected} free coordinates");
+        }
         self.x.copy_from_slice(x);
         self.v.copy_from_slice(v);
     }

@@ -1,4 +1,5 @@
-//! Newton's method for the equilibrium of the elastic coordinates, `r(e) = 0`.
+//! Newton's method for the equilibrium of the elastic coordinates, `r(e) = 0`, for any [`Forces`]: under weight,
+//! under a wrench at the tool, in steady rotation.
 
 use nalgebra::DVector;
 

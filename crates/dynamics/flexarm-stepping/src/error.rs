@@ -1,4 +1,6 @@
-//! Errors that stop a simulation.
+//! Errors that stop a simulation, with time, step and what to change.
+//!
+//! Texts name settings by [`Setting`], so that each face shows its own word. Not here: errors of files.
 
 use flexarm_kinematics::{Data, Model};
 use flexarm_settings::Setting;

@@ -66,17 +66,17 @@ impl ExactRun {
         let plant = Arc::new(plant);
         let mut stepper = settings.stepper(plant.clone(), step_s, &e)?;
         stepper.integrator = stepper.integrator.exactly();
-        let (mut seen, mut poses) = (Observation::new(&plant), ToolPoses::new(&plant, &self.tool));
+        let (mut observed, mut poses) = (Observation::new(&plant), ToolPoses::new(&plant, &self.tool));
         let mut found = ToolErrors::default();
         for step in 0..=steps(self.duration_s, step_s) {
             if step > 0 {
                 stepper.step()?;
             }
-            stepper.observe(&mut seen);
-            let [X_rigid, X] = poses.at(&seen);
+            stepper.observe(&mut observed);
+            let [X_rigid, X] = poses.at(&observed);
             let p = X.translation.vector - X_rigid.translation.vector;
             let theta = rotation_vector(&(X.rotation.matrix() * X_rigid.rotation.matrix().transpose()));
-            found.times_s.push(seen.t);
+            found.times_s.push(observed.t);
             found.errors.push([p.x, p.y, p.z, theta.x, theta.y, theta.z]);
         }
         found.limited = stepper.system.servo.as_ref().map_or(Vec::new(), |servo| servo.limited.clone());

@@ -1,4 +1,5 @@
-//! Forces of load-dependent (geometric) stiffness of modal bodies.
+//! Forces of load-dependent (geometric) stiffness of modal bodies: `f = Σ load_k G_k η`, with loads from
+//! accelerations and angular velocity of the body and from the wrenches at its interfaces.
 
 use flexarm_kinematics::{Data, JointMotion, Wrench};
 use flexarm_spatial::GeometricStiffness;

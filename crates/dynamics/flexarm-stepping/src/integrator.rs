@@ -1,6 +1,7 @@
 //! Interface between integrators and their callers: a time grid, a state, events.
 //!
-//! [`ReducedStepper`] combines any integrator with a flexible arm; its steps also end at events.
+//! [`ReducedStepper`] combines any integrator with a flexible arm; its steps also end at events. Start
+//! at [`Integrator`]. Not here: robots (only in [`ReducedStepper`]), Newton's method (`implicit`).
 
 use std::sync::Arc;
 
@@ -61,11 +62,11 @@ impl TimeGrid {
     }
 
     /// Returns whether the current time is on the grid.
-    pub fn is_on_step(&self) -> bool {
+    pub(crate) fn is_on_step(&self) -> bool {
         self.t == self.after(0)
     }
 
-    /// Sets the current time to `t` (s), at most the next grid time.
+    /// Sets the current time to `t` (s), at most the next grid time, and counts a step if it is that.
     pub fn reach(&mut self, t: f64) {
         self.steps += u64::from(t == self.next_time());
         self.t = t;
@@ -92,7 +93,7 @@ impl Current {
     /// [`StepError::Singular`] if the acceleration cannot be computed.
     ///
     /// # Panics
-    /// If `h` is not positive.
+    /// If `h` is not positive, or x or v does not have one entry per coordinate of the system.
     pub fn new(
         system: &mut impl SecondOrderSystem,
         t0: f64,
@@ -100,7 +101,11 @@ impl Current {
         x: DVector<f64>,
         v: DVector<f64>,
     ) -> Result<Self, StepError> {
-        assert!(h > 0.0, "the step is positive");
+        assert!(h > 0.0, "the step must be positive, found {h} s");
+        for (what, found) in [("x", x.len()), ("v", v.len())] {
+            let expected = system.dimension();
+            assert!(found == expected, "{what} has {found} entries, the system has {expected} coordinates");
+        }
         let acceleration = DVector::zeros(system.dimension());
         let mut current = Self { grid: TimeGrid::new(t0, h), x, v, acceleration };
         current.accelerate(system)?;

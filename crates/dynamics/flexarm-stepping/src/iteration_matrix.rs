@@ -32,13 +32,13 @@ pub(crate) enum MatrixForm {
     Tree(TreeInverse),
 }
 
-/// `(M + C)^-1 B`; after reading, `C = c_D D + c_K K` and `B = 1`. All are n × n; M and C are
+/// `(M + Z)^-1 B`; after reading, `Z = c_D D + c_K K` and `B = 1`. All are n × n; M and Z are
 /// symmetric.
 #[derive(Clone, Debug)]
 pub(crate) struct DenseInverse {
     /// M; after the inversion the factor.
     pub(crate) M: DMatrix<f64>,
-    pub(crate) C: DMatrix<f64>,
+    pub(crate) Z: DMatrix<f64>,
     /// Bᵀ; after the inversion the inverse.
     pub(crate) inverse: DMatrix<f64>,
     product: DVector<f64>,
@@ -48,17 +48,17 @@ impl DenseInverse {
     /// Allocates matrices for n coordinates.
     fn new(n: usize) -> Self {
         let square = || DMatrix::zeros(n, n);
-        Self { M: square(), C: square(), inverse: square(), product: DVector::zeros(n) }
+        Self { M: square(), Z: square(), inverse: square(), product: DVector::zeros(n) }
     }
 
     fn read(&mut self, system: &mut impl SecondOrderSystem, c_D: f64, c_K: f64) {
         system.mass(&mut self.M);
-        system.damping_and_stiffness(c_D, c_K, &mut self.C);
+        system.damping_and_stiffness(c_D, c_K, &mut self.Z);
         self.inverse.fill_with_identity();
     }
 
     fn invert(&mut self, t: f64) -> Result<(), StepError> {
-        self.M += &self.C;
+        self.M += &self.Z;
         let n = self.M.nrows();
         match solve_in_place(self.M.as_mut_slice(), self.inverse.as_mut_slice(), n) {
             true => Ok(()),

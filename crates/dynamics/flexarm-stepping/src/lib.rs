@@ -6,6 +6,9 @@
 //! [`SecondOrderSystem`]; SPOOK works in the maximal coordinates of the bodies. Not here: files,
 //! metrics, the replacement of links by flexible ones.
 //!
+//! Without a stepper: [`static_equilibrium`] and [`OperatingPoint`] for poses at rest, [`linearise`]
+//! for small motions about them, [`EquationsOfMotion`] for solvers of other programs.
+//!
 //! ```
 //! use std::sync::Arc;
 //! use flexarm_kinematics::*;
@@ -78,7 +81,7 @@ pub use guide::{Guide, GuideTerm, Play};
 pub use integrator::{Current, Integrator, TimeGrid};
 pub use linear::{Linear, Tangents, linearise};
 pub use load::{Load, LoadAxes, TimedWrench};
-pub use modes::{modes_at, modes_of};
+pub use modes::modes_of;
 pub use motion::{Held, MotionFn, PrescribedMotion};
 pub use observation::Observation;
 pub use operating_point::{OperatingPoint, PoseAnswer, PoseOutputs};

@@ -1,4 +1,7 @@
 //! Natural frequencies and mode shapes of the arm about its static equilibrium, drives locked.
+//!
+//! `K_t φ = ω² M φ` over the elastic coordinates; K_t is the stiffness of the springs plus that of
+//! weight and loads. Not here: damped modes and frequency response (`flexarm-analysis`).
 
 use flexarm_kinematics::{Data, State, mass_matrix};
 use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
@@ -12,7 +15,7 @@ use crate::statics::{for_vibration, static_equilibrium, tangent_stiffness};
 ///
 /// # Errors
 /// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
-pub fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
+pub(crate) fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
     let n = plant.n_elastic_coordinates();
     if n == 0 {
         return Ok(Modes::default());
@@ -31,12 +34,13 @@ pub fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
     modes_of(&Kt, &M, t).map(|modes| Modes { equilibrium, ..modes })
 }
 
-/// Computes the undamped modes of a stiffness (symmetric) and a mass matrix, without equilibrium.
+/// Computes the undamped modes of a stiffness `Kt` and a mass matrix `M`, n×n, symmetric, without
+/// equilibrium: ω (rad/s) ascending, shapes with `Φᵀ M Φ = 1`, and the residual of the eigensolver.
 ///
-/// * `t`: time for messages.
+/// * `t`: time (s) for messages.
 ///
 /// # Errors
-/// [`StepError::Singular`].
+/// [`StepError::Singular`] if a matrix is not positive definite.
 pub fn modes_of(Kt: &DMatrix<f64>, M: &DMatrix<f64>, t: f64) -> Result<Modes, StepError> {
     let n = Kt.nrows();
     // K φ = ω² M φ with K = L Lᵀ: the eigenvalues of L^-1 M L^-T are 1/ω², so the low modes are the

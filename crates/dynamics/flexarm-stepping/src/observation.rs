@@ -1,4 +1,8 @@
 //! Observable quantities of a stepper: state, poses, forces, energies, powers.
+//!
+//! Poses are in the world; forces and powers have the sign of what acts on the arm, dissipation is
+//! positive. Steppers in reduced coordinates share [`observe_reduced`]. Not here: the TCP error
+//! (`flexarm-run`).
 
 use std::sync::Arc;
 
@@ -82,9 +86,9 @@ pub(crate) fn observe_reduced(
     out.qdot.copy_from(&state.qdot);
     out.qddot.copy_from(&system.qddot);
 
-    // Drives: inverse dynamics of prescribed joints, held torques of controlled joints.
+    // Drives: inverse dynamics of prescribed joints, torques of the controller for the others.
     out.drive.copy_from(&data.tau.rows(0, n));
-    for (&k, torque) in driven.iter().zip(system.held_torques()) {
+    for (&k, torque) in driven.iter().zip(system.servo_torques()) {
         out.drive[k] = *torque;
     }
 

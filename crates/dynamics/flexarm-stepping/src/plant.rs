@@ -76,7 +76,7 @@ pub struct ElasticElement {
     pub modal: bool,
     /// Stiffness, size×size.
     pub K: DMatrix<f64>,
-    /// `K^-1`.
+    /// Compliance `K^-1`.
     pub C: DMatrix<f64>,
     /// Damping.
     pub damping: Damping,
@@ -230,7 +230,7 @@ impl Modes {
 }
 
 impl Plant {
-    /// Returns the damping ratio of the first mode; 0 without elastic coordinates.
+    /// Returns the damping ratio of the first mode, `φᵀ D φ / (2 ω)`; 0 without elastic coordinates.
     pub fn first_damping_ratio(&self) -> f64 {
         let Some(omega) = self.modes.omega.first() else { return 0.0 };
         let shape = self.modes.shapes.column(0);
@@ -307,7 +307,7 @@ impl Plant {
     }
 
     /// Writes the external loads at time `t` into `data.F_ext`, for the poses in `data.X_WB`.
-    pub fn apply_loads(&self, data: &mut Data, t: f64) {
+    pub(crate) fn apply_loads(&self, data: &mut Data, t: f64) {
         for load in &self.loads {
             data.F_ext[load.body] = Wrench::zeros();
         }

@@ -1,4 +1,8 @@
 //! Joint targets at which the tool of a flexible arm at rest is at the pose of the rigid arm.
+//!
+//! Newton's method on the displacement of the tool as a function of the motor positions; then servos
+//! without an integral get the lead that their gains need. Start at [`static_targets`]. Not here:
+//! motions (`flexarm-compensate`).
 
 use std::sync::Arc;
 
@@ -61,6 +65,7 @@ pub enum TargetError {
 
 /// Computes joint targets with which the tool at rest is where the rigid arm has it at `q`.
 ///
+/// * `q`: positions of the actuated joints (rad or m).
 /// * `plant`: its own motion is ignored; the payload is that at time 0.
 /// * `F_T_W`: constant wrench on the tool, world axes, as in [`linearise`].
 /// * `t`: time (s) at which the arm's loads are evaluated.
@@ -71,7 +76,7 @@ pub enum TargetError {
 /// their gains, and the targets are offset by this error.
 ///
 /// # Errors
-/// [`TargetError`].
+/// [`TargetError`]; [`StepError::Setup`] for a wrong number of joints.
 pub fn static_targets(
     plant: &Plant,
     tool: &Frame,
@@ -80,6 +85,11 @@ pub fn static_targets(
     t: f64,
     components: &[bool; 6],
 ) -> Result<StaticTargets, TargetError> {
+    let joints = plant.model.n_actuated();
+    if q.len() != joints {
+        let text = format!("{} joint positions are given, the arm has {joints} joints", q.len());
+        return Err(StepError::Setup(text).into());
+    }
     let (servo, plant) = (&plant.servo, &plant.with_motors_held());
     let wanted = rigid_pose(plant, tool, q);
     let rows: Vec<usize> = (0..6).filter(|k| components[*k]).collect();

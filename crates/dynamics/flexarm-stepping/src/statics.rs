@@ -1,5 +1,9 @@
-//! Static equilibrium of the elastic coordinates, drives held: Newton's method on
+//! Static equilibrium of the elastic coordinates, drives fixed: Newton's method on
 //! `K e + g_e(q_a, e) = 0`.
+//!
+//! K is the stiffness of the springs, `g_e` weight, loads and load-dependent stiffness. Start at
+//! [`static_equilibrium`]; [`static_forces`] and [`StaticSlopes`] serve all statics of the crate. Not
+//! here: Newton's iteration (`equilibrium`), many poses (`operating_point`).
 
 use flexarm_kinematics::products::{add, cross, lift, tr_mul};
 use flexarm_kinematics::{
@@ -315,10 +319,10 @@ impl StaticSlopes {
         plant: &Plant,
         data: &Data,
         moved: (usize, &Twist),
-        seen: usize,
+        observed: usize,
         p: &mut [f64],
     ) -> Twist {
-        self.exact.add_moved_subtree(&plant.model, data, moved, seen, p)
+        self.exact.add_moved_subtree(&plant.model, data, moved, observed, p)
     }
 
     fn difference(

@@ -6,7 +6,8 @@
 //! ```
 //! The integrators ([`crate::GeneralizedAlpha`], [`crate::Rk4`]) depend on this trait and know
 //! nothing of robots. The trait provides residual, acceleration and matrices and knows nothing of
-//! any integrator. [`crate::ReducedArm`] implements it for the flexible arm; the tests implement it
+//! any integrator. n-vectors x, v, a: positions, velocities (1/s) and accelerations (1/s²) in m or
+//! rad; forces in N or N m. [`crate::ReducedArm`] implements it for the flexible arm; the tests implement it
 //! for a pendulum and an oscillator.
 
 use nalgebra::{DMatrix, DVector};
@@ -19,10 +20,10 @@ pub trait SecondOrderSystem {
     /// Returns the number of coordinates.
     fn dimension(&self) -> usize;
 
-    /// Writes `r(t, x, v, a)` (N or N m) into `r`.
+    /// Writes `r(t, x, v, a)`, n forces at time t (s), into `r`.
     fn residual(&mut self, t: f64, x: &DVector<f64>, v: &DVector<f64>, a: &DVector<f64>, r: &mut DVector<f64>);
 
-    /// Writes the acceleration for which the residual vanishes into `a`.
+    /// Writes the acceleration a for which the residual vanishes into `a` (n).
     ///
     /// # Errors
     /// [`StepError::Singular`] if the mass matrix cannot be factorised.
@@ -37,10 +38,10 @@ pub trait SecondOrderSystem {
     /// Writes the n × n mass matrix M at the configuration of the last `residual` call into `M`.
     fn mass(&mut self, M: &mut DMatrix<f64>);
 
-    /// Writes `c_D D + c_K K` (n × n) into `C`: tangent damping and stiffness at the configuration
+    /// Writes `Z = c_D D + c_K K` (n × n) into `Z`: tangent damping and stiffness at the configuration
     /// of the last `residual` call. Used by Newton's method only: omitted terms cost iterations,
     /// not accuracy.
-    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>);
+    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, Z: &mut DMatrix<f64>);
 
     /// Writes the stiffness matrix K of the springs about their relaxed positions (constant,
     /// symmetric, n × n) into `K`.

@@ -69,15 +69,15 @@ impl ToolRun {
     /// [`StepError`] as returned by a stepper.
     pub fn deflection(&self, plant: &Arc<Plant>) -> Result<ToolDeflection, StepError> {
         let mut stepper = new_stepper(self.stepper, plant.clone(), self.step_s, self.start)?;
-        let (mut seen, mut poses) = (Observation::new(plant), ToolPoses::new(plant, &self.tool));
+        let (mut observed, mut poses) = (Observation::new(plant), ToolPoses::new(plant, &self.tool));
         let mut result = ToolDeflection { steps: steps(self.duration_s, self.step_s), ..ToolDeflection::default() };
         for step in 0..=result.steps {
             if step > 0 {
                 stepper.step()?;
             }
-            stepper.observe(&mut seen);
-            let [rigid, flexible] = poses.at(&seen);
-            result.include(seen.t, flexible.translation.vector - rigid.translation.vector, self.keep_samples);
+            stepper.observe(&mut observed);
+            let [rigid, flexible] = poses.at(&observed);
+            result.include(observed.t, flexible.translation.vector - rigid.translation.vector, self.keep_samples);
         }
         result.rms_m = (result.rms_m / (result.steps + 1) as f64).sqrt();
         Ok(result)
@@ -107,11 +107,11 @@ impl<'a> ToolPoses<'a> {
     }
 
     /// Returns the poses on the rigid and on the flexible arm at the time of an observation.
-    pub(crate) fn at(&mut self, seen: &Observation) -> [Pose; 2] {
+    pub(crate) fn at(&mut self, observed: &Observation) -> [Pose; 2] {
         let Self { plant, tool, rigid, q, rates: [rates, accelerations] } = self;
-        plant.motion.sample(seen.t, &mut q.as_mut_slice()[..rates.len()], rates, accelerations);
+        plant.motion.sample(observed.t, &mut q.as_mut_slice()[..rates.len()], rates, accelerations);
         forward_kinematics(&plant.model, rigid, q);
-        [rigid.X_WF(tool), seen.X_WB[tool.body] * tool.X_BF]
+        [rigid.X_WF(tool), observed.X_WB[tool.body] * tool.X_BF]
     }
 }
 
@@ -121,7 +121,7 @@ mod tests {
 
     /// The square of a rounded root may be less than the number.
     #[test]
-    fn a_peak_that_lasts_is_told_with_its_first_time() {
+    fn a_peak_that_lasts_has_the_time_of_its_first_sample() {
         for k in 1..200 {
             let deflection = Vector3::new(1e-3 * f64::from(k), 0.3e-3, -0.7e-3);
             let mut result = ToolDeflection::default();

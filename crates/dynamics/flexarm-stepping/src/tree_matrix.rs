@@ -5,34 +5,34 @@
 //! per node:
 //!
 //! ```text
-//! α_j = X_j α_p + x_j,   X_j = [A B; 0 C]                                                     (1)
+//! α_j = X_j α_p + x_j,   X_j = [X_t X_tr; 0 X_r]                                             (1)
 //! M = Σ_j (∂α_j/∂x)ᵀ I_j (∂α_j/∂x)                                                            (2)
 //! M^-1 f:   α_j = I_j^-1 (f_j - Σ_children X_cᵀ f_c),   x_j = α_j - X_j α_p                    (3)
 //! ```
-//! A matrix `M + S`, with one block `S_j` per node in S, is solved as in the articulated-body
+//! A matrix `M + Z`, with one block `Z_j` per node in Z, is solved as in the articulated-body
 //! algorithm:
 //!
 //! ```text
-//! inward    Î_j = I_j + Σ_children X_cᵀ I'_c X_c,   Δ_j = Î_j + S_j,   I'_j = S_j Δ_j^-1 Î_j  (4)
-//!           w_j = Δ_j^-1 (r_j - Σ_children X_cᵀ f_c),   f_j = r_j - S_j w_j                    (5)
+//! inward    Î_j = I_j + Σ_children X_cᵀ I'_c X_c,   Δ_j = Î_j + Z_j,   I'_j = Z_j Δ_j^-1 Î_j  (4)
+//!           w_j = Δ_j^-1 (r_j - Σ_children X_cᵀ f_c),   f_j = r_j - Z_j w_j                    (5)
 //! outward   x_j = w_j - Δ_j^-1 Î_j X_j α_p                                                 (6)
 //! ```
 //!
 //! **With a correction** by s, such as the dispersion correction of generalised-alpha,
 //!
 //! ```text
-//! J = M + C (1 + s M^-1 K)                                                                  (7)
+//! J = M + Z (1 + s M^-1 K)                                                                  (7)
 //! ```
 //! has no such form. But with `u = s M^-1 K x` as a second unknown it has, with two vectors per
 //! node, and (4) to (6) apply unchanged:
 //!
 //! ```text
-//! [ M + C    C ] [ x ]   [ r ]
-//! [ -s K     M ] [ u ] = [ 0 ]        S_j = [ C_j C_j; -s K_j 0 ],   I and X in both rows     (8)
+//! [ M + Z    Z ] [ x ]   [ r ]
+//! [ -s K     M ] [ u ] = [ 0 ]        [ Z_j Z_j; -s K_j 0 ] for Z_j,   I and X in both rows   (8)
 //! ```
-//! and the step needs u as well. With some coordinates held the matrix keeps its form, with
+//! and the step needs u as well. With some coordinates fixed the matrix keeps its form, with
 //! determinant `det M det J > 0`, because
-//! `(1 + s K M^-1) J = M + s K + (1 + s K M^-1) C (1 + s M^-1 K)` is positive definite: no two by
+//! `(1 + s K M^-1) J = M + s K + (1 + s K M^-1) Z (1 + s M^-1 K)` is positive definite: no two by
 //! two pivot vanishes, whatever the damping.
 //!
 //! Source of (4) to (6): [Featherstone 2008], Table 7.1. Not here: bodies and joints.
@@ -50,10 +50,10 @@ pub struct TreeNode {
     pub parent: Option<usize>,
     /// `I` of (2) in the module documentation, symmetric.
     pub inertia: Matrix6<f64>,
-    /// `A`, `B`, `C` of X in (1).
+    /// `X_t`, `X_tr`, `X_r` of X in (1).
     pub carried: [Matrix3<f64>; 3],
-    /// Block of `c_D D + c_K K`, symmetric.
-    pub C: Matrix6<f64>,
+    /// Block of `Z = c_D D + c_K K`, symmetric.
+    pub Z: Matrix6<f64>,
     /// Block of the stiffness K of the springs about their relaxed positions, symmetric.
     pub K: Matrix6<f64>,
 }
@@ -66,7 +66,7 @@ impl TreeNode {
             parent,
             inertia: zero,
             carried: [Matrix3::identity(), Matrix3::zeros(), Matrix3::identity()],
-            C: zero,
+            Z: zero,
             K: zero,
         }
     }
@@ -187,12 +187,13 @@ impl TreeNode {
     /// Returns `X α`.
     #[inline]
     fn outward(&self, alpha: &Vector6<f64>) -> Vector6<f64> {
-        let [A, B, C] = &self.carried;
+        let [X_t, X_tr, X_r] = &self.carried;
         let [x, y, z, u, v, w] = alpha.data.0[0];
         let mut moved = [0.0; 6];
         for i in 0..3 {
-            moved[i] = A[(i, 0)] * x + A[(i, 1)] * y + A[(i, 2)] * z + B[(i, 0)] * u + B[(i, 1)] * v + B[(i, 2)] * w;
-            moved[3 + i] = C[(i, 0)] * u + C[(i, 1)] * v + C[(i, 2)] * w;
+            let along = X_t[(i, 0)] * x + X_t[(i, 1)] * y + X_t[(i, 2)] * z;
+            moved[i] = along + X_tr[(i, 0)] * u + X_tr[(i, 1)] * v + X_tr[(i, 2)] * w;
+            moved[3 + i] = X_r[(i, 0)] * u + X_r[(i, 1)] * v + X_r[(i, 2)] * w;
         }
         Vector6::from(moved)
     }
@@ -200,13 +201,13 @@ impl TreeNode {
     /// Returns `Xᵀ f`.
     #[inline]
     fn inward(&self, f: &Vector6<f64>) -> Vector6<f64> {
-        let [A, B, C] = &self.carried;
+        let [X_t, X_tr, X_r] = &self.carried;
         let [x, y, z, u, v, w] = f.data.0[0];
         let mut carried = [0.0; 6];
         for i in 0..3 {
-            carried[i] = A[(0, i)] * x + A[(1, i)] * y + A[(2, i)] * z;
-            carried[3 + i] =
-                B[(0, i)] * x + B[(1, i)] * y + B[(2, i)] * z + C[(0, i)] * u + C[(1, i)] * v + C[(2, i)] * w;
+            carried[i] = X_t[(0, i)] * x + X_t[(1, i)] * y + X_t[(2, i)] * z;
+            let lever = X_tr[(0, i)] * x + X_tr[(1, i)] * y + X_tr[(2, i)] * z;
+            carried[3 + i] = lever + X_r[(0, i)] * u + X_r[(1, i)] * v + X_r[(2, i)] * w;
         }
         Vector6::from(carried)
     }
@@ -217,26 +218,33 @@ impl TreeNode {
         Matrix6::from_columns(&[0, 1, 2, 3, 4, 5].map(|k| self.inward(&half.column(k).into()))).transpose()
     }
 
-    /// Returns `S` of (4), or of (8) with F = 2.
+    /// Returns the block `Z_j` of (4), or that of (8) with F = 2.
     fn springs<const F: usize>(&self, s: f64) -> Matrices<F> {
-        let mut S = [[self.C; F]; F];
+        let mut Z = [[self.Z; F]; F];
         if F > 1 {
-            S[F - 1] = [self.K * -s; F];
-            S[F - 1][F - 1] = Matrix6::zeros();
+            Z[F - 1] = [self.K * -s; F];
+            Z[F - 1][F - 1] = Matrix6::zeros();
         }
-        S
+        Z
     }
 
-    /// Returns `S x`.
+    /// Returns `Z_j x` with the block of [`Self::springs`].
     #[inline]
     fn stretched<const F: usize>(&self, s: f64, x: &Vectors<F>) -> Vectors<F> {
         if F == 1 {
-            return [product(&self.C, &x[0]); F];
+            return [product(&self.Z, &x[0]); F];
         }
-        let mut y = [product(&self.C, &(x[0] + x[F - 1])); F];
+        let mut y = [product(&self.Z, &(x[0] + x[F - 1])); F];
         y[F - 1] = product(&self.K, &(x[0] * -s));
         y
     }
+}
+
+/// Checks that a vector has six entries per node.
+#[track_caller]
+fn check_vector(what: &str, found: usize, nodes: &[TreeNode]) {
+    let expected = 6 * nodes.len();
+    assert!(found == expected, "{what} has {found} entries, expected six for each of the {} nodes", nodes.len());
 }
 
 /// Elimination (4) of one node.
@@ -253,7 +261,7 @@ struct Eliminated<const F: usize> {
     w: Vectors<F>,
 }
 
-/// Elimination of `M + S`.
+/// Elimination of `M + Z`.
 #[derive(Clone, Debug, Default)]
 struct Elimination<const F: usize> {
     s: f64,
@@ -274,15 +282,15 @@ impl<const F: usize> Elimination<F> {
         for (j, own) in tree.iter().enumerate().rev() {
             let (inner, outer) = self.nodes.split_at_mut(j);
             let node = &mut outer[0];
-            // Pivot Δ = Î + S.
+            // Pivot Δ = Î + Z.
             node.inverse = node.inertia;
-            for (to, S) in node.inverse.iter_mut().flatten().zip(own.springs::<F>(s).iter().flatten()) {
-                *to += S;
+            for (to, Z) in node.inverse.iter_mut().flatten().zip(own.springs::<F>(s).iter().flatten()) {
+                *to += Z;
             }
             if !invert(&mut node.inverse) {
                 return false;
             }
-            // Columns of Δ^-1 Î and of S Δ^-1 Î, F vectors each.
+            // Columns of Δ^-1 Î and of Z Δ^-1 Î, F vectors each.
             let mut passed = zero;
             for (c, k) in (0..F).flat_map(|c| (0..6).map(move |k| (c, k))) {
                 let solved = products(&node.inverse, &from_fn(|i| node.inertia[i][c].column(k).into()));
@@ -292,7 +300,7 @@ impl<const F: usize> Elimination<F> {
                     passed[i][c].set_column(k, &stretched[i]);
                 }
             }
-            // Î of the parent takes Xᵀ S Δ^-1 Î X.
+            // Î of the parent takes Xᵀ Z Δ^-1 Î X.
             let Some(p) = own.parent else { continue };
             for (to, passed) in inner[p].inertia.iter_mut().flatten().zip(passed.iter().flatten()) {
                 *to += own.inertia_inward(passed);
@@ -337,12 +345,12 @@ impl<const F: usize> Elimination<F> {
     }
 }
 
-/// `J^-1` on a tree for `J = M + C`, or for (7); see the module documentation.
+/// `J^-1` on a tree for `J = M + Z`, or for (7); see the module documentation.
 #[derive(Clone, Debug, Default)]
 pub struct TreeInverse {
     /// The matrices to factorise.
     pub matrices: TreeMatrices,
-    /// s of (7); `None` for `J = M + C`.
+    /// s of (7); `None` for `J = M + Z`.
     s: Option<f64>,
     plain: Elimination<1>,
     corrected: Elimination<2>,
@@ -355,7 +363,7 @@ pub struct TreeInverse {
 }
 
 impl TreeInverse {
-    /// Factorises `matrices`: (7) with s, or `M + C` without.
+    /// Factorises `matrices`: (7) with s, or `M + Z` without; `t`: time (s) for messages. O(n).
     ///
     /// # Errors
     /// [`StepError::Singular`] if an inertia or `J` is not positive definite.
@@ -388,9 +396,13 @@ impl TreeInverse {
         Ok(())
     }
 
-    /// Replaces `r` by `d = J^-1 r`; with s also computes [`TreeInverse::shift`].
+    /// Replaces `r` (6 per node) by `d = J^-1 r`; with s also computes [`TreeInverse::shift`].
+    ///
+    /// # Panics
+    /// If `r` does not have six entries per node.
     pub fn solve(&mut self, r: &mut DVector<f64>) {
         let nodes = &self.matrices.nodes;
+        check_vector("r", r.len(), nodes);
         if self.s.is_none() {
             self.plain.solve(nodes, r.as_slice());
             for (d, node) in r.as_mut_slice().chunks_exact_mut(6).zip(&self.plain.nodes) {
@@ -411,8 +423,13 @@ impl TreeInverse {
         &self.shift
     }
 
-    /// Computes `y = x + s M^-1 K x`, by (3).
+    /// Computes `y = x + s M^-1 K x`, by (3); x and y have six entries per node.
+    ///
+    /// # Panics
+    /// If x or y has another length.
     pub fn correct(&mut self, x: &DVector<f64>, y: &mut DVector<f64>) {
+        check_vector("x", x.len(), &self.matrices.nodes);
+        check_vector("y", y.len(), &self.matrices.nodes);
         let Self { matrices, s, inverse_inertia, alpha, .. } = self;
         let s = s.unwrap_or(0.0);
         // Inward pass: accumulate the forces from the children.
@@ -425,6 +442,7 @@ impl TreeInverse {
             }
             alpha[j] = product(&inverse_inertia[j], &(f - alpha[j]));
         }
+        // Outward pass: x_j = α_j - X_j α_p.
         for (j, node) in matrices.nodes.iter().enumerate() {
             let moved = node.parent.map_or(Vector6::zeros(), |p| node.outward(&alpha[p]));
             for i in 0..6 {

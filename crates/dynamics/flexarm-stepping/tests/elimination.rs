@@ -72,7 +72,7 @@ fn assembled(tree: &TreeMatrices) -> [DMatrix<f64>; 3] {
         }
         E.view_mut((0, 6 * j), (6, 6)).fill_with_identity();
         to[0] += E.transpose() * DMatrix::from_column_slice(6, 6, node.inertia.as_slice()) * &E;
-        to[1].view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.C);
+        to[1].view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.Z);
         to[2].view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.K);
         moves.push(E);
     }

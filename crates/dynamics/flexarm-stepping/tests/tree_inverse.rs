@@ -22,7 +22,7 @@ fn tree(seed: u64, count: usize) -> TreeMatrices {
             parent: parent.checked_sub(1),
             inertia: draw.definite(0.3),
             carried: [block(&mut draw), block(&mut draw), block(&mut draw)],
-            C: draw.definite(0.1) * size,
+            Z: draw.definite(0.1) * size,
             K: draw.definite(0.1) * size,
         }
     });
@@ -53,7 +53,7 @@ fn dense(tree: &TreeMatrices) -> [DMatrix<f64>; 3] {
         E.view_mut((0, 6 * j), (6, 6)).fill_with_identity();
         let I = DMatrix::from_column_slice(6, 6, node.inertia.as_slice());
         M += E.transpose() * I * &E;
-        C.view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.C);
+        C.view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.Z);
         K.view_mut((6 * j, 6 * j), (6, 6)).copy_from(&node.K);
         moves.push(E);
     }
@@ -98,7 +98,7 @@ fn the_corrected_matrix_is_solved_with_one_elimination_whatever_the_damping() {
         let nu = 10f64.powf(size);
         let s = nu / tau.unwrap_or(1.0);
         if let Some(tau) = tau {
-            matrices.nodes.iter_mut().for_each(|node| node.C = node.K * (tau * nu));
+            matrices.nodes.iter_mut().for_each(|node| node.Z = node.K * (tau * nu));
         }
         let [M, C, K] = dense(&matrices);
         let M_inverse_K = M.clone().lu().solve(&K).unwrap();

@@ -1,6 +1,7 @@
 //! Selection among the solutions: sides of shoulder, elbow and wrist, configuration data of robot
 //! programs, and whole turns within limits.
 //!
+//! Start at [`AnalyticArm::choose`]. Not here: the solutions (`wrist`, `parallel`).
 //! Sources: [KUKA KSS] for status and turn, [ABB RAPID] for confdata.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -109,7 +110,7 @@ pub fn kuka_turn(q: &[f64; 6], axes: &ControllerAxes) -> u8 {
 }
 
 /// ABB quarter turn of an axis (rad): 0 for 0 to 90 degrees, -1 for -90 to 0, and so on.
-pub fn abb_quadrant(axis: f64) -> i32 {
+fn abb_quadrant(axis: f64) -> i32 {
     (axis / FRAC_PI_2).floor() as i32
 }
 
@@ -239,6 +240,7 @@ impl AnalyticArm {
         }
     }
 
+    /// Sine of the angle of joint 5 beyond the straight wrist.
     fn beyond(&self, phi: f64, q: f64) -> f64 {
         let phi = if self.sides.wrist_at_phi { phi } else { phi + PI };
         (q - phi).sin()

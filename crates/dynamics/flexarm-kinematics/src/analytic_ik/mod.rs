@@ -62,7 +62,7 @@ mod wrist;
 
 use flexarm_spatial::Pose;
 
-pub use branch::{Branch, ControllerAxes, Selection, abb_quadrant, kuka_turn};
+pub use branch::{Branch, ControllerAxes, Selection, kuka_turn};
 pub use position::PositionForm;
 pub use recognise::{AXIS_TOLERANCE, AXIS_TOLERANCE_RAD, ArmClass, NoAnalyticIk};
 pub use screw::Miss;

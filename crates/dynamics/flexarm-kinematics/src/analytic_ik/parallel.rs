@@ -1,5 +1,8 @@
 //! Arms with three successive parallel axes: projection onto their common direction leaves
-//! equations in the other angles only.
+//! equations in the other angles only. What remains is a planar problem of two bars ([`two_bars`]).
+//!
+//! World axes; `s_i` is the screw of joint i, `E_i` its motion and `R_i` its rotation, h the direction
+//! of the three parallel axes, `G = X_WT X_WT(0)^-1`. Not here: which axes are parallel (`recognise`).
 
 use std::f64::consts::FRAC_PI_4;
 
@@ -8,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 
 use super::position::{ROUNDING, bars_reach, feet, two_bars};
 use super::screw::Screw;
-use super::trig::{Fan, List, Roots, TrigPolynomial, across, angle_about, dot_turned, linear};
+use super::trig::{CirclePlane, List, Roots, TrigPolynomial, across, angle_about, dot_turned, linear};
 use super::{Candidates, Kind, STRAIGHT};
 
 /// Axes 2, 3 and 4 are parallel (or, from the other end, 3, 4 and 5).
@@ -17,7 +20,7 @@ pub(crate) struct Parallel234 {
     pub(crate) axes: [Screw; 6],
     /// Closest points of axes 5 and 6 (m).
     pub(crate) near: (Vector3<f64>, Vector3<f64>),
-    pub(crate) fan: Fan,
+    pub(crate) fan: CirclePlane,
     pub(crate) meet: bool,
     pub(crate) reach: f64,
 }
@@ -64,7 +67,7 @@ fn near_points(axes: &[Screw; 6], meet: bool) -> (Vector3<f64>, Vector3<f64>) {
 
 impl Parallel234 {
     pub(crate) fn new(axes: [Screw; 6], meet: bool, reach: f64) -> Self {
-        let fan = Fan::new(&axes[1].h, &axes[4].h, &axes[5].h);
+        let fan = CirclePlane::new(&axes[1].h, &axes[4].h, &axes[5].h);
         Self { axes, near: near_points(&axes, meet), fan, meet, reach }
     }
 
@@ -117,7 +120,7 @@ impl Parallel234 {
             }
             return pairs;
         }
-        // a_i cos q1 + b_i sin q1 = K_i(q5), lengths relative to the reach.
+        // a_i cos q1 + b_i sin q1 = k_i(q5), lengths relative to the reach.
         let (kt, at, bt) = dot_turned(&tip, &s1.h, &h);
         let (kr, ar, br) = dot_turned(&h, &s5.h, &s6.h);
         let (kp, ap, bp) = dot_turned(&h, &s5.h, &(o6 - o5));
@@ -131,16 +134,16 @@ impl Parallel234 {
     }
 }
 
-/// Solves `a_i cos t + b_i sin t = K_i(u)`, i = 1, 2, with K affine in cosine and sine of u, for
+/// Solves `a_i cos t + b_i sin t = k_i(u)`, i = 1, 2, with k affine in cosine and sine of u, for
 /// pairs (t, u).
 fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pairs: &mut Pairs) {
-    let [(a1, b1, K1), (a2, b2, K2)] = rows;
-    let D = a1 * b2 - a2 * b1;
-    if D.abs() > 1e-6 {
+    let [(a1, b1, k1), (a2, b2, k2)] = rows;
+    let d = a1 * b2 - a2 * b1;
+    if d.abs() > 1e-6 {
         // Cramer's rule for the cosine and sine of t; cos² t + sin² t = 1 determines u.
         let zero = TrigPolynomial::affine(0.0, 0.0, 0.0);
-        let cosine = zero.plus(K1, b2 / D).plus(K2, -b1 / D);
-        let sine = zero.plus(K2, a1 / D).plus(K1, -a2 / D);
+        let cosine = zero.plus(k1, b2 / d).plus(k2, -b1 / d);
+        let sine = zero.plus(k2, a1 / d).plus(k1, -a2 / d);
         let one = TrigPolynomial::affine(1.0, 0.0, 0.0);
         let equation = cosine.times(&cosine).plus(&sine.times(&sine), 1.0).plus(&one, -1.0);
         for &u in equation.roots(1e-3).as_slice() {
@@ -150,15 +153,15 @@ fn pair_of_equations(rows: &[(f64, f64, TrigPolynomial); 2], hint: &[f64; 6], pa
     }
     // The left-hand sides are proportional: eliminating t leaves an equation in u only.
     let (big, small) = if a1.hypot(*b1) >= a2.hypot(*b2) { (0, 1) } else { (1, 0) };
-    let (a, b, K) = &rows[big];
+    let (a, b, k_big) = &rows[big];
     let size = a.hypot(*b).max(f64::MIN_POSITIVE);
     let factor = (rows[small].0 * a + rows[small].1 * b) / (size * size);
-    let rest = rows[small].2.plus(K, -factor);
+    let rest = rows[small].2.plus(k_big, -factor);
     let k = rest.at(0.0).0 + rest.at(std::f64::consts::PI).0;
     let (cosine, sine) = (rest.at(0.0).0 - 0.5 * k, rest.at(std::f64::consts::FRAC_PI_2).0 - 0.5 * k);
     let us = linear(cosine, sine, -0.5 * k, ROUNDING, hint[4]);
     for &u in us.angles() {
-        let ts = linear(*a, *b, K.at(u).0, ROUNDING, hint[0]);
+        let ts = linear(*a, *b, k_big.at(u).0, ROUNDING, hint[0]);
         for &t in ts.angles() {
             pairs.push((t, u, us.free || ts.free));
         }
@@ -220,16 +223,16 @@ impl Parallel123 {
         let l = 1.0 / self.reach;
         let rows =
             [self.row(&Vector3::zeros(), &s6.h, level), self.row(&((o5 - s4.o) * l), &((o6 - o5) * l), height * l)];
-        // Cramer's rule for cos q4 = C/D and sin q4 = S/D; C² + S² = D² determines q5.
+        // Cramer's rule for cos q4 = a/d and sin q4 = b/d; a² + b² = d² determines q5.
         let [(a1, b1, k1), (a2, b2, k2)] = &rows;
-        let D = a1.times(b2).plus(&a2.times(b1), -1.0);
-        let C = k1.times(b2).plus(&k2.times(b1), -1.0);
-        let S = a1.times(k2).plus(&a2.times(k1), -1.0);
-        let equation = C.times(&C).plus(&S.times(&S), 1.0).plus(&D.times(&D), -1.0);
+        let d = a1.times(b2).plus(&a2.times(b1), -1.0);
+        let a = k1.times(b2).plus(&k2.times(b1), -1.0);
+        let b = a1.times(k2).plus(&a2.times(k1), -1.0);
+        let equation = a.times(&a).plus(&b.times(&b), 1.0).plus(&d.times(&d), -1.0);
         for &q5 in equation.roots(1e-3).as_slice() {
-            let (C, S, D) = (C.at(q5).0, S.at(q5).0, D.at(q5).0);
-            if D.abs() > 1e-6 {
-                pairs.push(((S / D).atan2(C / D), q5, false));
+            let (a, b, d) = (a.at(q5).0, b.at(q5).0, d.at(q5).0);
+            if d.abs() > 1e-6 {
+                pairs.push(((b / d).atan2(a / d), q5, false));
                 continue;
             }
             // The two rows are dependent: take both roots of one; one of them may not satisfy the

@@ -1,4 +1,9 @@
 //! Classification of an arm from its joint axes.
+//!
+//! Start at [`AnalyticArm::new`]. [`recognise`] tries the classes from both ends of the arm; [`Lines`]
+//! are the axes in world coordinates at zero joint values, in the order from one of the ends.
+//! Deviations are angles (rad) or lengths relative to the reach. Not here: the solvers (`wrist`,
+//! `parallel`).
 
 use nalgebra::{DVector, Matrix3, Vector3};
 
@@ -124,11 +129,11 @@ pub enum NoAnalyticIk {
         /// Maximum angle within the three successive axes that are closest to parallel (rad).
         parallel_rad: f64,
     },
-    /// The held joint values have the wrong length or are not finite.
+    /// The values of the fixed joints have the wrong length or are not finite.
     #[error(
-        "analytic inverse kinematics: {found} held joint values for a model of {needed} coordinates, or some are not finite"
+        "analytic inverse kinematics: {found} joint values for a model of {needed} coordinates, or some are not finite"
     )]
-    Held {
+    FixedJoints {
         /// Values given.
         found: usize,
         /// Coordinates of the model.
@@ -157,14 +162,14 @@ impl AnalyticArm {
         }
     }
 
-    /// Creates the solver for six of the joints with all others held, such as a rail, a turntable
+    /// Creates the solver for six of the joints with all others fixed, such as a rail, a turntable
     /// or a seventh axis.
     ///
     /// * `joints`: indices of the six coordinates, in the order of the chain.
-    /// * `q_held`: values of all coordinates, nv long (rad or m); those of the six are ignored.
+    /// * `q_fixed`: values of all coordinates, nv long (rad or m); those of the six are ignored.
     ///
     /// # Errors
-    /// [`NoAnalyticIk`] with the missing geometric property, or for a `q_held` of another length.
+    /// [`NoAnalyticIk`] with the missing geometric property, or for a `q_fixed` of another length.
     ///
     /// # Panics
     /// If a joint is not a coordinate of the model.
@@ -172,13 +177,13 @@ impl AnalyticArm {
         model: &Model,
         frame: &Frame,
         joints: &[usize; 6],
-        q_held: &DVector<f64>,
+        q_fixed: &DVector<f64>,
     ) -> Result<Self, NoAnalyticIk> {
-        if q_held.len() != model.nv() || !q_held.iter().all(|x| x.is_finite()) {
-            return Err(NoAnalyticIk::Held { found: q_held.len(), needed: model.nv() });
+        if q_fixed.len() != model.nv() || !q_fixed.iter().all(|x| x.is_finite()) {
+            return Err(NoAnalyticIk::FixedJoints { found: q_fixed.len(), needed: model.nv() });
         }
         check_open(model, frame)?;
-        let chain = chain_of(model, frame, joints, q_held)?;
+        let chain = chain_of(model, frame, joints, q_fixed)?;
         let smallest = dexterity(&chain);
         if smallest < 1e-7 {
             return Err(NoAnalyticIk::Deficient { frame: frame.name.clone(), smallest });
@@ -219,9 +224,10 @@ fn moving_joints(model: &Model, frame: &Frame) -> Vec<usize> {
     joints
 }
 
-/// World lines of the six joint axes at zero, with all other joints held.
-fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<f64>) -> Result<Chain, NoAnalyticIk> {
-    let mut q = q_held.clone();
+/// World lines of the six joint axes at zero, with all other joints fixed.
+fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_fixed: &DVector<f64>) -> Result<Chain, NoAnalyticIk> {
+    // The six joints are revolute and actuated; they stand at zero, all others where they are fixed.
+    let mut q = q_fixed.clone();
     for &k in joints {
         let inside = model.coordinates().get(k).filter(|_| k < model.n_actuated());
         let Some(coordinate) = inside else {
@@ -237,6 +243,7 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<
     }
     let mut data = Data::new(model);
     forward_kinematics(model, &mut data, &q);
+    // Axes from the frame to the base, then in the order of the chain.
     let mut axes = Vec::with_capacity(6);
     let mut body = frame.body;
     while body > 0 {
@@ -259,6 +266,7 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_held: &DVector<
     }
     let axes: [Screw; 6] = std::array::from_fn(|i| axes[i].1);
     let X_0 = data.X_WF(frame);
+    // Reach: distances between successive axis points, and to the frame.
     let ends = axes[1..].iter().map(|a| a.o).chain([X_0.translation.vector]);
     let reach = axes.iter().zip(ends).map(|(a, end)| (end - a.o).norm()).sum::<f64>().max(1e-6);
     Ok(Chain { axes, X_0, reach })

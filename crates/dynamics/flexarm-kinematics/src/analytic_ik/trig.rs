@@ -103,7 +103,8 @@ pub(crate) fn across(h: &Vector3<f64>) -> Vector3<f64> {
     (e - h * h.dot(&e)).normalize()
 }
 
-/// Solves `u · R(h, t) w = u · v` for the angle t, without cancellation near the ends of the range.
+/// Solves `u · R(h, t) w = u · v` for the angle t, without cancellation near the ends of the range:
+/// the circle of the turned w meets a plane normal to u (subproblem 4 of [Elias & Wen 2022]).
 ///
 /// ```text
 /// u · R(h, t) w = a + b cos(t - phi),     t = phi ± d,     tan²(d/2) = (a + b - u·v) / (u·v - a + b)
@@ -111,13 +112,13 @@ pub(crate) fn across(h: &Vector3<f64>) -> Vector3<f64> {
 /// If the range ends at ±1 (`w` can be rotated onto `u`, as in a straight wrist), `1 - u·v` is
 /// computed as `|u - v|²/2`.
 #[derive(Clone, Copy, Debug)]
-pub struct Fan {
+pub struct CirclePlane {
     pub(crate) phi: f64,
     a: f64,
     b: f64,
 }
 
-impl Fan {
+impl CirclePlane {
     /// Prepares the equation for u, the unit axis h and w, in the same axes.
     pub fn new(u: &Vector3<f64>, h: &Vector3<f64>, w: &Vector3<f64>) -> Self {
         let (a, cosine, sine) = dot_turned(u, h, w);
@@ -163,7 +164,7 @@ impl TrigPolynomial {
         if k < 0 { c.conj() } else { c }
     }
 
-    /// Product; its degree is the sum of the two degrees.
+    /// Product; its degree, at most four, is the sum of the two degrees.
     pub fn times(&self, other: &Self) -> Self {
         let degree = self.degree + other.degree;
         let (n, m) = (self.degree as isize, other.degree as isize);

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use super::position::{PositionForm, place};
 use super::screw::Screw;
-use super::trig::{Fan, across, angle_about};
+use super::trig::{CirclePlane, across, angle_about};
 use super::{Candidates, Kind, STRAIGHT};
 
 /// Pose-independent data of the solver.
@@ -16,13 +16,13 @@ pub(crate) struct Wrist {
     /// Intersection point at zero joint values (m).
     pub(crate) center: Vector3<f64>,
     pub(crate) form: PositionForm,
-    pub(crate) fan: Fan,
+    pub(crate) fan: CirclePlane,
     pub(crate) reach: f64,
 }
 
 impl Wrist {
     pub(crate) fn new(axes: [Screw; 6], center: Vector3<f64>, form: PositionForm, reach: f64) -> Self {
-        let fan = Fan::new(&axes[3].h, &axes[4].h, &axes[5].h);
+        let fan = CirclePlane::new(&axes[3].h, &axes[4].h, &axes[5].h);
         Self { axes, center, form, fan, reach }
     }
 

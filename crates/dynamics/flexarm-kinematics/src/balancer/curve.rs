@@ -1,4 +1,4 @@
-//! Force law interpolated between points.
+//! Force law interpolated between points: cubics for the tension T(x), quartics for the energy U(x).
 
 /// Interpolated tension: piecewise cubics with continuous slope and no overshoot between data
 /// points [Fritsch & Butland 1984]; linear extrapolation beyond the first and last point.
@@ -67,7 +67,7 @@ impl BalancerCurve {
         Ok(Self { x, T, slope, U })
     }
 
-    /// First and last x of the data points.
+    /// First and last x of the data points (m or rad).
     pub fn range(&self) -> [f64; 2] {
         [self.x[0], self.x[self.x.len() - 1]]
     }

@@ -1,4 +1,7 @@
 //! Force laws: tension, rate and energy as functions of length.
+//!
+//! `T = dU/dx` and `k = dT/dx` hold for every law; a new law needs an arm in the three functions of
+//! [`BalancerLaw`]. Not here: the points between which it acts (`placed`).
 
 use crate::balancer::curve::BalancerCurve;
 
@@ -53,7 +56,7 @@ pub struct GasLaw {
 }
 
 impl GasLaw {
-    /// Gas volume relative to that at the length `at`.
+    /// Gas volume relative to that at the length `at`, at length `x` (m); negative beyond [`Self::end`].
     pub fn volume_ratio(&self, x: f64) -> f64 {
         let stretch = self.slope * (x - self.at);
         if self.pulls { 1.0 - stretch } else { 1.0 + stretch }

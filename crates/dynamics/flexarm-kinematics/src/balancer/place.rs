@@ -1,4 +1,4 @@
-//! Placement of the balancers of a mechanism on the bodies of the tree.
+//! Placement of the balancers of a mechanism on the bodies of the tree: names become bodies, points and coordinates.
 
 use std::collections::HashSet;
 

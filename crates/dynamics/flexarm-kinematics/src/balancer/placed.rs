@@ -1,4 +1,6 @@
 //! Balancer placed on the tree: the points or coordinates on which it acts, and its forces.
+//!
+//! (1) to (3) of the module. W world, B a body; From and To are the ends 0 and 1 of a line.
 
 use flexarm_spatial::{Pose, Twist, Wrench};
 use nalgebra::{Matrix3, Vector3};

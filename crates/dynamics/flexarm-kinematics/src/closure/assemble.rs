@@ -1,4 +1,7 @@
 //! Assembly of the loops: choice of the assembly mode, and checks of plane and dead points.
+//!
+//! Start at [`assemble`]. A, C, `X_C` as in `geometry`. Not here: the names in a loop closure
+//! (`draft`), the equations (`positions`).
 
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
@@ -14,7 +17,7 @@ use crate::model::{JointMotion, Model, ModelError};
 
 /// Angular tolerance on joint axes being parallel or perpendicular to the pin axis (rad): several times
 /// what a calibration of joint frames finds. The closure holds for tilted axes too.
-pub const LOOP_AXIS_TOLERANCE_RAD: f64 = 2e-2;
+const LOOP_AXIS_TOLERANCE_RAD: f64 = 2e-2;
 /// Minimum angle between the two columns of J_d at assembly (rad). Nearer to a dead point, the loop
 /// cannot be distinguished from its mirror image.
 const DEAD_RAD: f64 = 1e-4;

@@ -2,12 +2,12 @@
 
 /// Workspace of a Cholesky solve; the solution is NaN if the matrix is not positive definite.
 #[derive(Clone, Debug, Default)]
-pub(super) struct CholeskyRoom {
+pub(super) struct CholeskyWorkspace {
     L: Vec<f64>,
     pub(super) right: Vec<f64>,
 }
 
-impl CholeskyRoom {
+impl CholeskyWorkspace {
     pub(super) fn fit(&mut self, n: usize) {
         self.L.resize(n * n, 0.0);
         self.right.resize(n, 0.0);

@@ -1,4 +1,8 @@
 //! Loops on the bodies of the tree before its coordinates are numbered, in order of dependence.
+//!
+//! [`draft_loops`] finds the bodies of each loop: the common body C of its two chains, the bodies with
+//! pin and eye, the two dependent joints. [`LoopDraft::placed`] adds the coordinates once they are
+//! numbered. Not here: the assembly mode (`assemble`).
 
 use flexarm_spatial::Pose;
 use nalgebra::{Rotation3, Vector3};
@@ -192,6 +196,8 @@ fn dependent_bodies(
     bodies: &[Body],
     chains: &[Vec<usize>; 2],
 ) -> Result<[usize; 2], ModelError> {
+    // Two different joints, each known, of a type that the closed form covers, without mimic
+    // relations, and between pin and eye.
     let mut found = [0; 2];
     if closure.dependent[0] == closure.dependent[1] {
         return Err(bad(

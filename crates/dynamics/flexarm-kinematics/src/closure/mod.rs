@@ -40,7 +40,6 @@ mod reduce;
 mod triangle;
 mod workspace;
 
-pub use assemble::LOOP_AXIS_TOLERANCE_RAD;
 pub use loop_closure::LoopClosure;
 pub use placed_loop::PlacedLoop;
 

@@ -1,4 +1,7 @@
 //! Positions of the dependent joints, equation (1), and their slopes T, equation (2) of the module.
+//!
+//! Loops are solved in their order of dependence; each starts from its closed form, so the result
+//! does not depend on the history.
 
 use nalgebra::{Matrix2, Vector2};
 

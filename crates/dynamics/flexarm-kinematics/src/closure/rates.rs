@@ -1,4 +1,7 @@
 //! Rates of the loops at given velocities: γ of equation (3) and the time derivative of T.
+//!
+//! Velocities `v`, `w` of the origins of the bodies are relative to the common body C, in its axes;
+//! rows of J and J̇ are in the plane of the pin A.
 
 use flexarm_spatial::Twist;
 use nalgebra::{Matrix2, Vector2, Vector3};

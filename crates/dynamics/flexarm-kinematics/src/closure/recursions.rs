@@ -1,4 +1,8 @@
 //! Recursions of the tree on the independent coordinates, equation (4) of the module.
+//!
+//! Each function has the name of the recursion that it stands for. It solves the positions of the
+//! dependent joints ([`with_loops`]), runs the recursion over the opened tree, and reduces the result.
+//! Not here: the matrices of (4) and (5) (`reduce`).
 
 use nalgebra::{DVector, Vector2, Vector3};
 
@@ -75,12 +79,13 @@ impl Data {
         self.loops.as_ref().map_or(&[], |loops| &loops.q[loops.solved.nv..])
     }
 
-    /// Rates of the dependent joints at the last velocities (rad/s or m/s).
+    /// Rates of the dependent joints at the last velocities (rad/s or m/s), in the same order.
     pub fn dependent_rates(&self) -> &[f64] {
         self.loops.as_ref().map_or(&[], |loops| &loops.qdot[loops.solved.nv..])
     }
 
-    /// Transmission angle of each loop at the last coordinates (rad, at most π/2).
+    /// Transmission angle of each loop at the last coordinates (rad, at most π/2): zero at a dead
+    /// point, π/2 at best.
     pub fn transmission_angles(&self) -> &[f64] {
         self.loops.as_ref().map_or(&[], |loops| &loops.solved.angle)
     }

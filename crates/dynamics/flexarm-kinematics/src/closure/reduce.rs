@@ -1,4 +1,7 @@
 //! Matrices of the tree reduced to the independent coordinates: mass matrix and static tangent.
+//!
+//! T is that of (2), its rows are the dependent coordinates d, e. Coordinates before `first` are left
+//! out.
 
 use flexarm_spatial::Twist;
 use nalgebra::DMatrix;

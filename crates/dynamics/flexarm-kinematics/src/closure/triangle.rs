@@ -1,4 +1,8 @@
 //! Closed form of a loop in its plane: the triangle of its two dependent joints and its end points.
+//!
+//! Two-vectors are in the plane normal to the pin (m), angles about the pin (rad). Joint a moves the
+//! end `moved`; joint b is carried by a, or moves the end `other`. Not here: deflections out of the
+//! plane (`positions`).
 
 use std::f64::consts::TAU;
 

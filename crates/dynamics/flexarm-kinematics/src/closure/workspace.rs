@@ -1,11 +1,13 @@
 //! Workspace of the loops in [`crate::Data`]: coordinates of the tree, solved positions, rates.
+//!
+//! Vectors over the tree have nv independent entries followed by the dependent ones, two per loop.
 
 use std::f64::consts::FRAC_PI_2;
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2, Vector3};
 
-use crate::closure::cholesky::CholeskyRoom;
+use crate::closure::cholesky::CholeskyWorkspace;
 use crate::model::Model;
 
 /// Closed loops at the last coordinates, with the workspace of the tree.
@@ -19,7 +21,7 @@ pub(crate) struct LoopData {
     pub(super) M: DMatrix<f64>,
     pub(super) solved: Solved,
     pub(super) rates: LoopRates,
-    pub(super) free: CholeskyRoom,
+    pub(super) free: CholeskyWorkspace,
 }
 
 /// Positions of the dependent joints and (2).
@@ -86,7 +88,7 @@ impl LoopData {
                 X: vec![Pose::identity(); model.bodies.len()],
             },
             rates: LoopRates::new(model),
-            free: CholeskyRoom::default(),
+            free: CholeskyWorkspace::default(),
         }
     }
 

@@ -292,4 +292,3 @@ impl<'a> Builder<'a> {
         self.mechanism.rotor_couplings.iter().map(placed).collect()
     }
 }
-

@@ -165,24 +165,24 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
     }
 }
 
-/// Computes `Eᵀ C E` with `E = 1 + c X` for a symmetric C; both workspaces are n × n.
+/// Computes `Eᵀ Z E` with `E = 1 + c X` for a symmetric Z, into `product`; all are n × n.
 #[inline(always)]
-pub fn congruence(c: f64, X: &[f64], C: &[f64], n: usize, workspaces: [&mut [f64]; 2], product: &mut [f64]) {
-    let [CE, Xt] = workspaces;
+pub fn congruence(c: f64, X: &[f64], Z: &[f64], n: usize, workspaces: [&mut [f64]; 2], product: &mut [f64]) {
+    let [ZE, Xt] = workspaces;
     if n == 0 {
         return;
     }
-    // P = C Sᵀ
-    CE.copy_from_slice(C);
-    for (column, x) in CE.chunks_exact_mut(n).zip(X.chunks_exact(n)) {
-        add_columns(C, x.iter().map(|x| c * x), column);
+    // Z E = Z + c Z X
+    ZE.copy_from_slice(Z);
+    for (column, x) in ZE.chunks_exact_mut(n).zip(X.chunks_exact(n)) {
+        add_columns(Z, x.iter().map(|x| c * x), column);
     }
-    // P + c Xᵀ P
+    // Eᵀ Z E = Z E + c Xᵀ Z E
     Xt.copy_from_slice(X);
     transpose(Xt, n);
-    product.copy_from_slice(CE);
-    for (column, p) in product.chunks_exact_mut(n).zip(CE.chunks_exact(n)) {
-        add_columns(Xt, p.iter().map(|p| c * p), column);
+    product.copy_from_slice(ZE);
+    for (column, z) in product.chunks_exact_mut(n).zip(ZE.chunks_exact(n)) {
+        add_columns(Xt, z.iter().map(|z| c * z), column);
     }
 }
 

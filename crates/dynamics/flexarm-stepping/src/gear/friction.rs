@@ -1,4 +1,5 @@
-//! Friction of the joints of an arm with load-dependent friction and coupled gears.
+//! Friction of the joints of an arm with load-dependent friction and coupled gears: torques against the motion (N m
+//! or N) and their slopes, per actuated coordinate.
 
 use crate::gear::load_friction::LoadFriction;
 use crate::gear::state::GearState;

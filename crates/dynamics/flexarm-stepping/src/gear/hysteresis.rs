@@ -1,4 +1,6 @@
 //! Rate-independent hysteresis of a gear: law, and state of its sliders.
+//!
+//! (2) and (3) of the module; δ is the deflection of the gear (rad or m), s that of a slider's spring.
 
 use crate::drive::TorqueCurve;
 
@@ -51,7 +53,7 @@ impl Hysteresis {
     }
 
     /// Returns the slope for small motions about the deflection `delta`, at which no slider slips.
-    pub fn stuck_slope(&self, delta: f64) -> f64 {
+    pub(crate) fn stuck_slope(&self, delta: f64) -> f64 {
         self.elastic.slope(delta) + self.sliders.iter().map(|slider| slider.stiffness).sum::<f64>()
     }
 
@@ -81,14 +83,17 @@ impl SliderState {
         self.s.iter().zip(&law.sliders).map(move |(s, slider)| ((s + way).clamp(-slider.reach, slider.reach), slider))
     }
 
+    /// Returns the torque of the sliders (N m or N).
     pub(super) fn torque(&self, law: &Hysteresis, delta: f64) -> f64 {
         self.at(law, delta).map(|(s, slider)| slider.stiffness * s).sum()
     }
 
+    /// Returns its slope: sliders that slip have none.
     pub(super) fn slope(&self, law: &Hysteresis, delta: f64) -> f64 {
         self.at(law, delta).map(|(s, slider)| if s.abs() < slider.reach { slider.stiffness } else { 0.0 }).sum()
     }
 
+    /// Returns the energy in the springs of the sliders (J).
     pub(super) fn energy(&self, law: &Hysteresis, delta: f64) -> f64 {
         self.at(law, delta).map(|(s, slider)| 0.5 * slider.stiffness * s * s).sum()
     }

@@ -1,4 +1,6 @@
 //! Arms with gear laws: checks, and effect of the laws on springs and dampers.
+//!
+//! C, K and θ are those of (5) of the module: here C are the gears, not a compliance.
 
 use nalgebra::DMatrix;
 
@@ -33,8 +35,8 @@ impl Plant {
             stiffness.push(element.K[(0, 0)]);
             damping.push(if let Damping::Dampers(d) = element.damping { d[0] } else { 0.0 });
         }
-        let K = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &stiffness));
-        let D = GearCoupling::on_joints(&coupling.C_inverse, &stiffness_of(n, &damping));
+        let K = GearCoupling::on_joints(&coupling.C_inverse, &per_motor(n, &stiffness));
+        let D = GearCoupling::on_joints(&coupling.C_inverse, &per_motor(n, &damping));
         // Off-diagonal entries become cross terms, the diagonal replaces that of the motors' springs.
         for (i, &k) in coupling.elements.iter().enumerate() {
             let row = self.offset(&self.elements[k]);
@@ -121,6 +123,6 @@ impl Plant {
 }
 
 /// Returns the values per motor; zeros if the gears are rigid.
-fn stiffness_of(n: usize, values: &[f64]) -> Vec<f64> {
+fn per_motor(n: usize, values: &[f64]) -> Vec<f64> {
     if values.is_empty() { vec![0.0; n] } else { values.to_vec() }
 }

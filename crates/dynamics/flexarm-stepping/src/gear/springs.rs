@@ -1,4 +1,7 @@
 //! Springs of an arm with gear laws: deflections, forces, and reactions on the motors.
+//!
+//! e: elastic coordinates, q: all coordinates, δ, F: (1) and (2) of the module. Not here: sliders
+//! during a run (`state`).
 
 use nalgebra::DVector;
 

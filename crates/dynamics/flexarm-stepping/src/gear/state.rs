@@ -1,4 +1,7 @@
 //! Gear state of a run: slider positions, and the forces of the last evaluation.
+//!
+//! Over the elastic coordinates: deflection δ and its rate, forces F; (1) to (3) of the module. Not
+//! here: the laws (`hysteresis`, `transmission`), forces on the motors (`springs`, `friction`).
 
 use nalgebra::{DVector, Vector6};
 

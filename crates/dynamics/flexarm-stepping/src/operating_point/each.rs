@@ -1,4 +1,7 @@
 //! Many poses of one arm, four or eight in parallel if processor and arm allow it.
+//!
+//! Start at [`OperatingPoint::solve_each`]. [`InLanes`] fills the lanes with poses; a pose that leaves
+//! the standard path of `lanes` is solved by itself. Not here: the equilibria (`super`, `lanes`).
 
 #[cfg(target_arch = "x86_64")]
 use flexarm_kinematics::{OverLanes, Real, with_lanes};
@@ -57,7 +60,7 @@ impl PoseAnswer {
 
 impl OperatingPoint {
     /// Computes equilibria at many poses under weight and a wrench at the tool, bitwise as
-    /// [`OperatingPoint::solve`] does, with the requested outputs; calls `seen` with the number of
+    /// [`OperatingPoint::solve`] does, with the requested outputs; calls `report` with the number of
     /// each pose and its result, in order.
     ///
     /// * `poses`: m×joints, pose after pose (rad or m).
@@ -73,14 +76,14 @@ impl OperatingPoint {
         poses: &[f64],
         F_T_W: &Wrench,
         asked: PoseOutputs,
-        mut seen: impl FnMut(usize, Result<&PoseAnswer, StepError>),
+        mut report: impl FnMut(usize, Result<&PoseAnswer, StepError>),
     ) {
         let joints = self.plant.model.n_actuated().max(1);
         let mut answers = vec![PoseAnswer::new(self.r.len()); LANES];
-        let done = self.in_lanes(poses, F_T_W, asked, &mut answers, &mut seen);
+        let done = self.in_lanes(poses, F_T_W, asked, &mut answers, &mut report);
         for (k, pose) in poses.chunks(joints).enumerate().skip(done) {
             let answer = self.alone(pose, F_T_W, asked, &mut answers[0]);
-            seen(k, answer);
+            report(k, answer);
         }
     }
 
@@ -118,7 +121,7 @@ impl OperatingPoint {
         F_T_W: &Wrench,
         asked: PoseOutputs,
         answers: &mut [PoseAnswer],
-        seen: &mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
+        report: &mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
     ) -> usize {
         let joints = self.plant.model.n_actuated();
         let finite = F_T_W.force.iter().chain(&F_T_W.torque).all(|x| x.is_finite());
@@ -126,7 +129,7 @@ impl OperatingPoint {
         if joints == 0 || poses.len() < 2 * joints || !finite || !plain(&self.plant) {
             return 0;
         }
-        with_lanes(poses.len() / joints, InLanes { point: self, poses, F_T_W, asked, answers, seen }).unwrap_or(0)
+        with_lanes(poses.len() / joints, InLanes { point: self, poses, F_T_W, asked, answers, report }).unwrap_or(0)
     }
 
     #[cfg(not(target_arch = "x86_64"))]
@@ -151,7 +154,7 @@ struct InLanes<'a> {
     asked: PoseOutputs,
     /// One per lane.
     answers: &'a mut [PoseAnswer],
-    seen: &'a mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
+    report: &'a mut dyn FnMut(usize, Result<&PoseAnswer, StepError>),
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -160,7 +163,7 @@ impl OverLanes for InLanes<'_> {
 
     #[inline(always)]
     fn run<T: Real>(self) -> usize {
-        let Self { point, poses, F_T_W, asked, answers, seen } = self;
+        let Self { point, poses, F_T_W, asked, answers, report } = self;
         let Some(mut points) = LanePoints::<T>::new(point) else { return 0 };
         let (joints, mut done) = (point.plant.model.n_actuated(), 0);
         for group in poses.chunks(T::LANES * joints) {
@@ -179,8 +182,8 @@ impl OverLanes for InLanes<'_> {
             points.answer(asked, &mut answers[..T::LANES]);
             for (lane, (pose, answer)) in group.chunks(joints).zip(answers.iter_mut()).enumerate() {
                 match found.lane(lane) == 1.0 && usable(pose) {
-                    true => seen(done, Ok(answer)),
-                    false => seen(done, point.alone(pose, F_T_W, asked, answer)),
+                    true => report(done, Ok(answer)),
+                    false => report(done, point.alone(pose, F_T_W, asked, answer)),
                 }
                 done += 1;
             }

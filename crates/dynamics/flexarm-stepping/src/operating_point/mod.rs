@@ -1,4 +1,4 @@
-//! An arm held at a sequence of poses: equilibrium, compliance, Jacobian and frequencies, without
+//! An arm at rest at a sequence of poses: equilibrium, compliance, Jacobian and frequencies, without
 //! allocation.
 //!
 //! ```text
@@ -57,7 +57,7 @@ pub struct OperatingPoint {
     F_T_W: Wrench,
     /// Static forces over all coordinates; the part of the joints is read after the solution.
     p: DVector<f64>,
-    /// Efforts of the joints that hold the equilibrium.
+    /// Efforts of the joints at the equilibrium.
     holding: DVector<f64>,
     slopes: StaticSlopes,
     /// Unbalanced forces, and Newton's step.
@@ -327,9 +327,20 @@ impl OperatingPoint {
         self.holding.as_slice()
     }
 
+    /// Checks that there is one number per elastic coordinate.
+    #[track_caller]
+    fn check_length(&self, what: &str, found: usize) {
+        let expected = self.r.len();
+        assert!(found == expected, "{what} has {found} entries, the arm has {expected} elastic coordinates");
+    }
+
     /// Adds the static forces on the elastic coordinates due to the weight of an additional inertia
-    /// on a body (about Bo, B axes) to `p` (n).
+    /// on a body (`M_BBo_B`) to `p` (n).
+    ///
+    /// # Panics
+    /// If `p` is not n long, or there is no such body.
     pub fn add_weight(&mut self, body: usize, inertia: &SpatialInertia, p: &mut [f64]) {
+        self.check_length("p", p.len());
         let model = self.plant.model.clone();
         if self.plant.elements.iter().any(|element| element.geometric.is_some()) {
             // Its stiffness depends on the weight; forces are linear in a mass.
@@ -352,7 +363,11 @@ impl OperatingPoint {
 
     /// Writes the static forces on the elastic coordinates, without springs, of another arm of the
     /// same tree at this equilibrium under weight, loads and the wrench into `p` (n).
+    ///
+    /// # Panics
+    /// If `p` is not n long.
     pub fn forces_of(&mut self, other: &Plant, p: &mut DVector<f64>) {
+        self.check_length("p", p.len());
         let mut all = DVector::zeros(self.q.len());
         static_forces(other, Some((&self.tool, &self.F_T_W)), 0.0, &mut self.data, &self.q, &mut all);
         p.copy_from(&all.rows(self.plant.model.n_actuated(), self.r.len()));
@@ -362,7 +377,11 @@ impl OperatingPoint {
     /// (world axes, at its origin), as the subtree of a body moves with a twist in the body's joint
     /// axes while all coordinates keep their values; `None` for arms with balancers or load-dependent
     /// stiffness.
+    ///
+    /// # Panics
+    /// If `p` is not n long, or there is no such body.
     pub fn moved_subtree(&mut self, body: usize, moved: &Twist, frame: &Frame, p: &mut [f64]) -> Option<Twist> {
+        self.check_length("p", p.len());
         let model = &self.plant.model;
         let geometric = self.plant.elements.iter().any(|element| element.geometric.is_some());
         if geometric || !model.balancers().is_empty() {
@@ -374,12 +393,12 @@ impl OperatingPoint {
         let w = R * moved.angular;
         let v = R * moved.linear + at.cross(&w);
         let moved = (body, &Twist::new(v, w));
-        let seen = self.slopes.add_moved_subtree(&self.plant, &self.data, moved, frame.body, p);
+        let V = self.slopes.add_moved_subtree(&self.plant, &self.data, moved, frame.body, p);
         let p_F = self.data.X_WF(frame).translation.vector;
-        Some(Twist::new(seen.linear + seen.angular.cross(&p_F), seen.angular))
+        Some(Twist::new(V.linear + V.angular.cross(&p_F), V.angular))
     }
 
-    /// Returns the pose of a frame of the arm in the world at the equilibrium.
+    /// Returns `X_WF`, the pose of a frame of the arm in the world at the equilibrium.
     pub fn pose_of(&self, frame: &Frame) -> Pose {
         self.data.X_WF(frame)
     }
@@ -395,7 +414,7 @@ impl OperatingPoint {
         &self.tangent.Y
     }
 
-    /// Returns the twist of the tool per rate of the coordinates, joints first, 6×(m + n).
+    /// Returns `J_WT_W`, the twist of the tool per rate of the coordinates, joints first, 6×(m + n).
     pub fn jacobian(&self) -> &Matrix6xX<f64> {
         &self.J
     }

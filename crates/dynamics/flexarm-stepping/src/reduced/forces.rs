@@ -1,4 +1,7 @@
 //! Generalised forces beside those of the tree: springs, dampers, friction, gears, controller.
+//!
+//! x, v, f are over the free coordinates: joints driven by torque, then elastic ones. Forces are on the
+//! left side of the equations of motion. Not here: inertia, weight and loads (the recursions).
 
 use nalgebra::DVector;
 

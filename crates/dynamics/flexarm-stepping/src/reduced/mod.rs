@@ -6,8 +6,8 @@
 //! ```
 //! The residual is one Newton-Euler pass, the acceleration one hybrid-dynamics pass. Mass matrix,
 //! damping and stiffness are dense in the free coordinates. Torques of a sampled controller are
-//! constant between its samples. Discrete events are in `events`. The residual and
-//! the matrices are in `system`. Not here: integration.
+//! constant between its samples. Start at [`ReducedArm`]; `system` has residual and matrices, `forces`
+//! springs, drives and gears, `events` what happens at discrete times. Not here: integration.
 
 mod events;
 mod forces;
@@ -206,9 +206,9 @@ impl ReducedArm {
         [kinetic_energy_of(&self.plant.model, &self.data), potential_energy_of(&self.plant.model, &self.data)]
     }
 
-    /// Returns the torques currently held by the controller, in the order of
+    /// Returns the torques of the controller since its last sample, in the order of
     /// [`Plant::torque_driven`]; empty without a controller.
-    pub(crate) fn held_torques(&self) -> &[f64] {
+    pub(crate) fn servo_torques(&self) -> &[f64] {
         self.servo.as_ref().map_or(&[], |s| &s.torque)
     }
 }

@@ -1,4 +1,7 @@
 //! Residual, acceleration and matrices of the arm as a second-order system.
+//!
+//! Matrices are over the free coordinates: joints driven by torque, then elastic ones. Not here:
+//! forces of springs, drives and gears (`forces`), events (`events`).
 
 use flexarm_kinematics::{hybrid_dynamics, inverse_dynamics, mass_matrix_at_poses};
 use nalgebra::{Cholesky, DMatrix, DVector};
@@ -82,19 +85,19 @@ impl SecondOrderSystem for ReducedArm {
         }
     }
 
-    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, C: &mut DMatrix<f64>) {
+    fn damping_and_stiffness(&mut self, c_D: f64, c_K: f64, Z: &mut DMatrix<f64>) {
         let driven = self.plant.torque_driven.len();
-        C.as_mut_slice().fill(0.0);
+        Z.as_mut_slice().fill(0.0);
         // Friction of the joints driven by torque.
         for (i, &k) in self.plant.torque_driven.iter().enumerate() {
             // A negative friction slope (Stribeck) is dropped to keep the matrix positive definite.
-            C[(i, i)] = c_D * self.plant.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
+            Z[(i, i)] = c_D * self.plant.friction.get(k).map_or(0.0, |f| f.slope(self.state.qdot[k]).max(0.0));
         }
         if let Some(gears) = &self.gears {
             let rates = self.state.qdot.as_slice();
             for (i, &row) in self.plant.torque_driven.iter().enumerate() {
                 for (j, &column) in self.plant.torque_driven.iter().enumerate() {
-                    C[(i, j)] = c_D * self.plant.friction_slope(row, column, rates, gears);
+                    Z[(i, j)] = c_D * self.plant.friction_slope(row, column, rates, gears);
                 }
             }
         }
@@ -107,20 +110,20 @@ impl SecondOrderSystem for ReducedArm {
                     Some(gears) => gears.slope(&self.plant, k, element, curve),
                     None => curve.slope(self.state.q[element.coordinate], self.state.q.as_slice()),
                 };
-                C[(first, first)] += c_K * slope + damping * element.K[(0, 0)];
+                Z[(first, first)] += c_K * slope + damping * element.K[(0, 0)];
             } else {
-                let mut block = C.view_mut((first, first), (size, size));
-                block.zip_apply(&element.K, |c, k| *c += (c_K + damping) * k);
+                let mut block = Z.view_mut((first, first), (size, size));
+                block.zip_apply(&element.K, |z, k| *z += (c_K + damping) * k);
             }
         }
         for &(i, j, k) in &self.plant.cross_stiffness {
-            C[(driven + i, driven + j)] += c_K * k;
-            C[(driven + j, driven + i)] += c_K * k;
+            Z[(driven + i, driven + j)] += c_K * k;
+            Z[(driven + j, driven + i)] += c_K * k;
         }
         // Otherwise the damping couples the elements.
         if !self.plant.proportional {
             let ne = self.dimension() - driven;
-            C.view_mut((driven, driven), (ne, ne)).zip_apply(&self.plant.D, |s, d| *s += c_D * d);
+            Z.view_mut((driven, driven), (ne, ne)).zip_apply(&self.plant.D, |z, d| *z += c_D * d);
         }
     }
 

@@ -30,7 +30,7 @@ pub use accuracy::error_of_a_period;
 pub use extrapolated::ExtrapolatedAlpha;
 pub use generalized_alpha::{AlphaSettings, GeneralizedAlpha};
 pub use reference::{Reference, ReferenceMethod, ReferenceSettings};
-pub use rk4::{Rk4, STABILITY_LIMIT};
+pub use rk4::Rk4;
 pub use sdirk3::Sdirk3;
 pub use spook::{ConstraintForm, Spook, SpookPreset, SpookSettings};
 

@@ -110,7 +110,7 @@ pub struct ReferenceSettings {
 }
 
 impl ReferenceSettings {
-    /// Creates settings with the default method; coordinates below 1 mm or 1 mrad count as small.
+    /// Creates settings with the default method and this relative tolerance; coordinates below 1 mm or 1 mrad count as small.
     pub fn new(rtol: f64) -> Self {
         Self { rtol, atol: SMALL * rtol, method: ReferenceMethod::default() }
     }
@@ -270,7 +270,7 @@ impl Reference {
     }
 
     /// Limits the solver's steps to `longest` (s).
-    pub fn limit_steps(&mut self, longest: f64) {
+    fn limit_steps(&mut self, longest: f64) {
         self.longest = self.longest.min(longest);
     }
 

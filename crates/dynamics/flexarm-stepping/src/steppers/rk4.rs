@@ -1,7 +1,7 @@
 //! Classical explicit Runge-Kutta method of fourth order, for non-stiff systems.
 //!
 //! Stable while `h ω < 2.78` for every undamped mode; stiffness-proportional damping narrows this
-//! further. Source: [Hairer, Nørsett & Wanner 1993], section II.1.
+//! further ([`check_explicit_step`] refuses larger steps). Source: [Hairer, Nørsett & Wanner 1993], section II.1.
 
 use std::sync::Arc;
 
@@ -51,7 +51,7 @@ impl Method for Rk4Settings {
 }
 
 /// Bound of `h ω` on the imaginary axis.
-pub const STABILITY_LIMIT: f64 = 2.78;
+const STABILITY_LIMIT: f64 = 2.78;
 
 /// The integrator with its state.
 #[derive(Clone, Debug)]

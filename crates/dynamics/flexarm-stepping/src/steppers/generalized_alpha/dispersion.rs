@@ -3,8 +3,8 @@
 //!
 //! ```text
 //! x̃ = E ẍ,   E = 1 + c h² M^-1 K                         (6)
-//! J = M + C E,   C = h γ' D + h² β' K                    (7)  derivative of (1) by ẍ⁺
-//! Eᵀ J = M + c h² K + Eᵀ C E,   J^-1 = (Eᵀ J)^-1 Eᵀ      (8)  symmetric for every damping, unlike J
+//! J = M + Z E,   Z = h γ' D + h² β' K                    (7)  derivative of (1) by ẍ⁺
+//! Eᵀ J = M + c h² K + Eᵀ Z E,   J^-1 = (Eᵀ J)^-1 Eᵀ      (8)  symmetric for every damping, unlike J
 //! ```
 //! Along a tree the matrix contains the complete correction: [`crate::tree_matrix`].
 
@@ -56,7 +56,7 @@ impl DispersionCorrection {
         self.c_h2 = self.c * dt * dt;
     }
 
-    /// Replaces M and C of the matrix by the terms of (8); with `kept`, (6) is not updated and only
+    /// Replaces M and Z of the matrix by the terms of (8); with `kept`, (6) is not updated and only
     /// the matrix changes.
     ///
     /// # Errors
@@ -86,10 +86,10 @@ impl DispersionCorrection {
             }
         }
 
-        // Product Eᵀ C E.
-        let (X, C) = (M_inverse_K.as_slice(), matrix.C.as_slice());
-        congruence(c_h2, X, C, n, [factor.as_mut_slice(), turned.as_mut_slice()], product.as_mut_slice());
-        matrix.C.copy_from(product);
+        // Product Eᵀ Z E.
+        let (X, Z) = (M_inverse_K.as_slice(), matrix.Z.as_slice());
+        congruence(c_h2, X, Z, n, [factor.as_mut_slice(), turned.as_mut_slice()], product.as_mut_slice());
+        matrix.Z.copy_from(product);
 
         // M + c h² K, and Eᵀ as right-hand side, stored transposed.
         matrix.M.zip_apply(K, |s, k| *s += c_h2 * k);

@@ -1,4 +1,5 @@
-//! Observation of SPOOK: coordinates, forces, energies and powers from bodies and impulses.
+//! Observation of SPOOK: coordinates, forces, energies and powers from bodies and impulses; `λ/h` is the mean
+//! force of a joint over the last step.
 
 use flexarm_kinematics::JointMotion;
 use nalgebra::{DVector, Matrix6, Vector6};

@@ -1,4 +1,4 @@
-//! Settings of SPOOK and its entry in the registry of steppers.
+//! Settings of SPOOK and its entry in the registry of steppers; Σ, Υ and τ are those of the module.
 
 use std::sync::Arc;
 
