@@ -36,7 +36,7 @@ RUNS = [
 POINTS = [["inspect"], ["check"], ["statics"], ["modes"], ["response", "--points", "50"]]
 CLOCK = re.compile(r"cpu|wall|elapsed|real_time", re.I)
 # Computation times in pages.
-TOOK = re.compile(r"simulated in [^<\n]*? processor time|^\| (?:in|processor) \|.*$", re.M)
+TOOK = re.compile(r"simulated in [^<\n]*? processor time|^\| (?:wall|CPU) time \|.*$", re.M)
 
 
 def run(program, words, timeout=900):
