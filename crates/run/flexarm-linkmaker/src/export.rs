@@ -245,7 +245,7 @@ impl Content<'_> {
     /// Returns the matrices in the units of the files; inverse of `assemble_interfaces`.
     fn matrices(&self) -> (DMatrix<f64>, Option<DMatrix<f64>>) {
         let units = &self.job.units;
-        let boundary = self.element.boundary();
+        let boundary = self.element.boundary(); // rows of the interfaces; modes follow
         // Unit of each coordinate: u_SI = diag(d) u_file.
         let d: Vec<f64> = (0..self.element.K.nrows())
             .map(|i| match i {
@@ -276,6 +276,7 @@ impl Content<'_> {
 
     /// Returns the names and texts of the files.
     fn files(&self) -> Vec<(String, String)> {
+        // Matrices in the units of the files, with their rows and units in words.
         let stem = file_stem(&self.link.name);
         let (K, M) = self.matrices();
         let said = format!("{}: {}; rows {}", self.link.name, self.job.units, self.row_order());

@@ -42,8 +42,8 @@
 //! # std::fs::remove_file(&mesh)?;
 //!
 //! // Along its axis a bar without lateral contraction is exact in any mesh: E A / l.
-//! assert!((link.stiffness[0][0] / (200e9 * 1e-4 / 1.0) - 1.0).abs() < 1e-9);
-//! assert!((link.mass_kg - 0.785).abs() < 1e-9);
+//! assert!((link.statics.stiffness[0][0] / (200e9 * 1e-4 / 1.0) - 1.0).abs() < 1e-9);
+//! assert!((link.statics.mass_kg - 0.785).abs() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -57,6 +57,7 @@
 
 mod error;
 pub mod export;
+mod figures;
 pub mod import;
 mod material_entry;
 pub mod reduce;

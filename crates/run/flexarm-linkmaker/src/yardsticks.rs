@@ -1,5 +1,8 @@
 //! Plausibility checks of stiffness against mass, and of the density of a link: detect unit errors
 //! and wrong matrices.
+//!
+//! Start at [`of_link`]. SI units, link axes. Not here: checks of the matrices themselves
+//! (`flexarm_fem::gate`), caveats about robots.
 
 use flexarm_fem::{ReducedLink, RigidPart};
 use flexarm_settings::Finding;
@@ -45,6 +48,7 @@ pub fn least_density(mass: f64, inertia: &Matrix3<f64>) -> f64 {
 
 /// Returns warnings about implausible stiffness or mass of a link made from files.
 pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
+    // Speed of sound along the link: stiffness and mass in matching units.
     let mut caveats = Vec::new();
     let length = (link.X_LB.translation.vector - link.X_LA.translation.vector).norm();
     let speed = sound_speed(&link.split.K_S, length, whole.mass).filter(|_| whole.mass > 0.0 && length > 0.0);
@@ -61,6 +65,7 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
         );
         caveats.push(Finding::warning("link-sound", "", said, "").measured(speed, yardstick));
     }
+    // Centre of mass and radius of gyration against the place of the interfaces.
     let (com, gyration) = (whole.com.norm(), (whole.inertia.symmetric_eigenvalues().max() / whole.mass).sqrt());
     let size = [link.X_LA, link.X_LB].map(|X| X.translation.vector.norm()).into_iter().fold(length, f64::max);
     for (code, what, value) in
@@ -74,6 +79,7 @@ pub(crate) fn of_link(link: &ReducedLink, whole: &RigidPart) -> Vec<Finding> {
             caveats.push(Finding::warning(code, "", said, "").measured(value, BEYOND * size));
         }
     }
+    // Density.
     let density = least_density(whole.mass, &whole.inertia);
     if density.is_finite() && density > OSMIUM {
         let said = format!(

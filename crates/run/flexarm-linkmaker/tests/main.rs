@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a failed unwrap fails the test")]
 #![allow(non_snake_case, reason = "monogram notation, as in the crate")]
 
+mod bar;
 mod import;
 mod job;
 mod mesh_mutations;

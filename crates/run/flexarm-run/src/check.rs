@@ -1,4 +1,8 @@
-//! Checks a robot and a trajectory and collects all findings.
+//! Checks a robot and a trajectory and collects all findings, as `flexarm check` does.
+//!
+//! Start at [`check`]. Whatever cannot be loaded or solved is a finding of severity `error`, so that
+//! one command reports everything. Not here: the caveats themselves ([`crate::caveat`]), those of a
+//! run.
 
 use std::path::Path;
 
@@ -151,6 +155,7 @@ fn check_flexible(robot: &Robot, motion: Option<&Motion>, findings: &mut Vec<Fin
         let help = "add [[flexible_link]] or [[drive]] entries to a robot.toml";
         findings.push(Finding::warning("no-flexible-link", &file, message, help).as_note());
     }
+    // At rest: frequencies, stress fields, caveats about links and the linear model.
     let posed = standing_pose(robot, motion).and_then(|at| {
         let posed = Posed::new(robot.model(&Modelling::default())?, at)?;
         let linear = posed.linear(&Vector6::zeros())?;

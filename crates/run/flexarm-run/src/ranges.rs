@@ -1,4 +1,9 @@
 //! Ranges of the numbers in flexarm's TOML files, by key: possible ones, and usual ones.
+//!
+//! A number outside its possible range is an error ([`outside`], [`not_finite`]), one outside its
+//! usual range a caveat ([`unusual`]). Keys are paths joined by dots; units are those of the files
+//! (SI, rad). Not here: numbers whose range depends on the robot ([`crate::caveat`]), the ranges of
+//! quantities (`flexarm_settings::Quantity`).
 
 use std::cell::RefCell;
 use std::f64::consts::TAU;

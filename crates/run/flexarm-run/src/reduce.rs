@@ -6,7 +6,7 @@
 //! let job = ReduceJob::load("lower_arm.reduce.toml".as_ref())?;
 //! let outputs = ReduceOutputs { folder: Some("out/lower_arm".into()), ..ReduceOutputs::default() };
 //! let summary = reduce(&job, &ReduceOptions::default(), Some(&outputs), &mut |_| {})?;
-//! println!("{:.2} kg, first frequency {:.1} Hz", summary.mass_kg, summary.frequencies_hz[0]);
+//! println!("{:.2} kg, first frequency {:.1} Hz", summary.statics.mass_kg, summary.frequencies_hz[0]);
 //! # Ok::<(), flexarm_run::Error>(())
 //! ```
 //!

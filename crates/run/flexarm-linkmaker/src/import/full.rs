@@ -1,4 +1,8 @@
 //! Full models: locates rows or nodes of the interfaces and condenses all other rows.
+//!
+//! Start at [`reduce`]. M is the frame of the matrices, L the link: matrices stay in M until they are
+//! condensed, frames of interfaces are in L; SI after [`to_si`]. Not here: the condensation
+//! (`flexarm_fem::reduction`), matrices that are reduced already (`import/mod.rs`).
 
 use std::collections::HashMap;
 
@@ -92,6 +96,7 @@ pub(super) fn reduce(
     let options = CondensationOptions::default();
     let rows = &imported.stiffness.rows;
     match map {
+        // Six rows per interface: angles where the map says so, whatever their label.
         ImportMap::Rows(map) => {
             let boundary = boundary_rows(imported, map)?;
             let mut is_turn: Vec<bool> = rows.iter().map(|label| label.dof > 3).collect();
@@ -102,6 +107,7 @@ pub(super) fn reduce(
             let M = to_si(mass, target.units, &is_turn, true);
             reduce_matrices(K, M, &boundary, target.frames, modes, options).map_err(failed)
         }
+        // Nodes of solids, tied rigidly to the interfaces by their positions.
         ImportMap::Nodes(list) => {
             if !is_solid(imported) || imported.positions.is_empty() {
                 let what = "planes require node positions and three degrees of freedom per node, as DMIG with GRID \
@@ -154,6 +160,7 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
         rows.iter().enumerate().filter_map(|(i, label)| Some(((label.node?, label.dof), i as u32))).collect();
     let mut boundary: Vec<u32> = Vec::new();
     for interface in &map.interfaces {
+        // Rows picked by their place in the matrix, or by node and degree of freedom.
         let refuse = |what: String| {
             LinkError::content(&imported.origin, format!("interface {}: {what}; {}", interface.name, propose(imported)))
         };
@@ -180,6 +187,7 @@ fn boundary_rows(imported: &ImportedMatrices, map: &InterfaceMap) -> Result<Vec<
             return Err(refuse(format!("{found} rows are selected, six are required (ux uy uz rx ry rz)")));
         }
     }
+    // A row can belong to one interface only.
     let mut sorted = boundary.clone();
     sorted.sort_unstable();
     sorted.dedup();

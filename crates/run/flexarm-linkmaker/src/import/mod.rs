@@ -16,7 +16,7 @@
 //! };
 //! let outputs = ImportOutputs { folder: Some("out/arm".into()), ..ImportOutputs::default() };
 //! let summary = import(&job, Some(&outputs))?;
-//! println!("{:.2} kg", summary.mass_kg);
+//! println!("{:.2} kg", summary.statics.mass_kg);
 //! # Ok::<(), flexarm_linkmaker::LinkError>(())
 //! ```
 //!
@@ -42,6 +42,7 @@ use flexarm_files::{check_apart, check_free, file_stem, write_all};
 use flexarm_settings::{Caller, Setting};
 use nalgebra::{DMatrix, Rotation3, Translation3, Vector3};
 
+use crate::figures::CostFigures;
 use crate::reduce::SplitChoice;
 use crate::robot_entry::robot_entry;
 use crate::{LinkError, Stopwatch, stamp};
@@ -157,9 +158,7 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
     };
 
     let mut summary = ImportSummary::new(&reduction, parts);
-    summary.wall_s = stopwatch.wall_s();
-    summary.cpu_s = stopwatch.cpu_s();
-    summary.peak_rss_bytes = stamp::peak_rss_bytes();
+    summary.cost = CostFigures::since(&stopwatch);
     if let Some(targets) = targets {
         targets.write(&write_flex(&reduction.link), &mut summary)?;
     }
@@ -195,6 +194,7 @@ impl Layout {
         R_LM: &Rotation3<f64>,
         warnings: &mut Vec<String>,
     ) -> Result<Self, LinkError> {
+        // The job goes before the sidecar.
         let sidecar = imported.sidecar.as_ref();
         let units = job.units.or(sidecar.map(|sidecar| sidecar.units));
         if let (Some(given), Some(sidecar)) = (job.units, sidecar)
@@ -210,6 +210,7 @@ impl Layout {
         let is_full =
             matches!(map, Some(ImportMap::Nodes(_))) || full::is_full(imported, map.as_ref().and_then(ImportMap::rows));
 
+        // Requests for what is in neither, with the text to type.
         let mut faults = Vec::new();
         if units.is_none() {
             faults.push(file_error(imported, no_units()));
@@ -324,6 +325,7 @@ fn reduced(
 
 /// Imports all formats that have a stiffness over physical coordinates.
 fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
+    // Matrices over the interfaces, in link axes.
     let imported = read(job).map_err(Box::new)?;
     expect_format(job, imported.format, &imported.origin)?;
     let mut warnings = imported.warnings.clone();
@@ -338,6 +340,7 @@ fn matrices(job: &ImportJob, name: &str) -> Result<(MatrixReduction, Parts), Lin
         (false, 0) => "reduced matrices".into(),
         (false, _) => format!("reduced matrices with {modes} modes"),
     };
+    // The link of two parts, with what its summary says about the files.
     let plan = plan(job, name, layout.units, &imported.origin, &format!("{method}, {}", imported.format.name()));
     let checked = if has_mass { Some(element.clone()) } else { None };
     let reduction = link_from_superelement(element, has_mass, &plan).map_err(|source| {
@@ -417,6 +420,7 @@ fn place(
     R_LM: &Rotation3<f64>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Placed>, LinkError> {
+    // Names of the job must be those of the map.
     let entries = map.entries();
     let names: Vec<String> = entries.iter().map(|(name, _)| name.clone()).collect();
     if names.len() < 2 {
@@ -432,6 +436,7 @@ fn place(
             return Err(LinkError::Job(format!("{} {}=... is given twice", Setting::At, at.name)));
         }
     }
+    // A frame of the job goes before that of the file, with a warning if they differ.
     let mut placed = Vec::new();
     for (k, name) in names.iter().enumerate() {
         let found =

@@ -20,6 +20,7 @@ use super::{ImportJob, SECOND_ORDER_UNKNOWN, plan, rotation};
 use crate::LinkError;
 
 pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(MatrixReduction, Parts), LinkError> {
+    // Content of the file; what the job must add to it.
     let sid = parse_sid(&String::from_utf8_lossy(&file.bytes), &file.origin).map_err(Box::new)?;
     let ids: Vec<i64> = sid.nodes.iter().map(|node| node.id).collect();
     let (units, nodes) = layout(job, &file.origin, &ids)?;
@@ -28,6 +29,7 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         warnings.push(format!("{} applies only to full models; all modes of a SID are kept", Setting::Modes));
     }
 
+    // Modal link in link axes, and the frames of the nodes, undeformed.
     let sid = sid.in_units(&units, &UnitSystem::SI);
     let R_LM = rotation(&job.axes_rpy);
     let modal = modal_link(&sid, name, &nodes, &R_LM, &mut warnings);
@@ -37,6 +39,8 @@ pub(super) fn import(job: &ImportJob, file: &InputFile, name: &str) -> Result<(M
         modal.as_ref().map_or(plain, |modal| if k == 0 { modal.X_LA } else { modal.interfaces[k - 1].X_LI })
     };
     let places: Vec<Pose> = (0..nodes.len()).map(place).collect();
+
+    // Static stiffness of the free body as the superelement of a link with two parts.
     let p = |k: usize| places[k].translation.vector;
     let frame = |k: usize| InterfaceFrame { name: nodes[k].0.clone(), X_LI: places[k], tie: None };
     let K = static_stiffness(&sid, [nodes[0].1, nodes[1].1], &R_LM, &(p(1) - p(0)))

@@ -1,5 +1,8 @@
-//! Figures of an import; those shared with `flexarm reduce` have the same keys. SI units, link
-//! axes.
+//! Figures of an import; those shared with `flexarm reduce` have the same keys.
+//!
+//! Start at [`ImportSummary`]. A is the proximal and B the distal interface; SI units, link axes,
+//! linear first. Not here: figures and tables shared with a reduction ([`crate::figures`]), the
+//! checks themselves (`flexarm_fem::gate`).
 
 use std::fmt::Write as _;
 
@@ -11,8 +14,8 @@ use nalgebra::DMatrix;
 use serde::Serialize;
 
 use super::SECOND_ORDER_UNKNOWN;
-use crate::reduce::{
-    ModalFigures, PartFigures, ReportTable, about, coarse, matrix_table, modal_table, rows3, rows6, warning_list,
+use crate::figures::{
+    CostFigures, ModalFigures, ReportTable, StaticFigures, about, below, coarse, triple, warning_list,
 };
 
 /// Result of `flexarm import`.
@@ -32,20 +35,9 @@ pub struct ImportSummary {
     pub rows: usize,
     /// Interfaces, proximal first.
     pub interfaces: Vec<ImportInterface>,
-    /// Mass of the whole link.
-    pub mass_kg: f64,
-    /// Centre of mass.
-    pub com_m: [f64; 3],
-    /// Inertia about the centre of mass, 3×3 (kg m²).
-    pub inertia: [[f64; 3]; 3],
-    /// Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad).
-    pub stiffness: [[f64; 6]; 6],
-    /// Inverse of the stiffness.
-    pub compliance: [[f64; 6]; 6],
-    /// Position of the elastic joint between the two parts.
-    pub split_m: [f64; 3],
-    /// The two rigid parts, proximal first.
-    pub parts: Vec<PartFigures>,
+    /// Mass and stiffness of the link.
+    #[serde(flatten)]
+    pub statics: StaticFigures,
     /// Natural frequencies with A held and B free (Hz); empty without a mass matrix or modes.
     pub frequencies_hz: Vec<f64>,
     /// Natural frequencies of the two rigid parts with their joint (Hz).
@@ -56,12 +48,9 @@ pub struct ImportSummary {
     pub modal: Option<ModalFigures>,
     /// Results of the checks.
     pub checks: ImportChecks,
-    /// Wall-clock time, excluding the writing of files (s).
-    pub wall_s: f64,
-    /// Processor time, all threads (s).
-    pub cpu_s: f64,
-    /// Peak memory of the process so far; null where the system does not report it.
-    pub peak_rss_bytes: Option<u64>,
+    /// Time and memory.
+    #[serde(flatten)]
+    pub cost: CostFigures,
     /// Warnings.
     pub warnings: Vec<String>,
     /// The same warnings with code, value and reference value.
@@ -136,6 +125,7 @@ const MASS_ERROR: f64 = 1e-6;
 impl ImportSummary {
     pub(super) fn new(reduction: &MatrixReduction, parts: Parts) -> Self {
         let MatrixReduction { link, whole, held_frequencies_hz, lumped_frequencies_hz, .. } = reduction;
+        // Mass matrix against the link, which may have other masses; findings; modal link.
         let gate = &link.checks;
         let masses = parts.element.as_ref().map(masses_along_axes);
         let mass_error = masses.map(|m| m.iter().map(|m| (m / whole.mass - 1.0).abs()).fold(0.0, f64::max));
@@ -149,13 +139,7 @@ impl ImportSummary {
             method: parts.method,
             rows: parts.rows,
             interfaces: parts.interfaces,
-            mass_kg: whole.mass,
-            com_m: whole.com.into(),
-            inertia: rows3(&whole.inertia),
-            stiffness: rows6(&link.K_BB),
-            compliance: link.tip_compliance().map_or([[f64::NAN; 6]; 6], |C| rows6(&C)),
-            split_m: link.split.X_LS.translation.vector.into(),
-            parts: vec![PartFigures::from(&link.proximal), PartFigures::from(&link.distal)],
+            statics: StaticFigures::new(link, whole),
             frequencies_hz: held_frequencies_hz.iter().copied().take(10).collect(),
             lumped_frequencies_hz: lumped_frequencies_hz.clone(),
             fixed_interface_hz: parts.element.as_ref().map_or_else(Vec::new, Superelement::fixed_frequencies_hz),
@@ -168,9 +152,7 @@ impl ImportSummary {
                 min_eigenvalue: gate.min_eigenvalue,
                 condition: gate.condition,
             },
-            wall_s: 0.0,
-            cpu_s: 0.0,
-            peak_rss_bytes: None,
+            cost: CostFigures::default(),
             warnings: all.iter().map(|finding| finding.message.clone()).collect(),
             caveats: about(&link.name, all),
             files: ImportFiles::default(),
@@ -223,60 +205,31 @@ fn masses_along_axes(element: &Superelement) -> [f64; 3] {
 
 /// Returns all tables of an import.
 pub fn tables(summary: &ImportSummary) -> Vec<ReportTable> {
-    let table = |title, header: &[&'static str], rows| ReportTable::new(title, header, rows);
-    let vector = |p: &[f64; 3]| p.map(|x| format!("{:.4}", if x.abs() < 5e-5 { 0.0 } else { x })).join(", ");
     let interfaces = summary.interfaces.iter();
     let interfaces = interfaces
-        .map(|i| vec![i.name.clone(), i.rows.clone(), vector(&i.position_m), vector(&i.rpy_rad), i.from.into()])
-        .collect();
-    let body = |name: &str, mass: f64, com: &[f64; 3], I: &[[f64; 3]; 3]| {
-        let moments = [I[0][0], I[1][1], I[2][2], I[0][1], I[0][2], I[1][2]].map(|x| format!("{x:.4e}")).join(", ");
-        vec![name.to_owned(), format!("{mass:.4}"), vector(com), moments]
-    };
-    let mut masses = vec![body("whole", summary.mass_kg, &summary.com_m, &summary.inertia)];
-    for (name, part) in ["proximal part", "distal part"].iter().zip(&summary.parts) {
-        masses.push(body(name, part.mass_kg, &part.com_m, &part.inertia));
-    }
-    masses.push(vec!["elastic joint".into(), String::new(), vector(&summary.split_m), String::new()]);
-    let C = &summary.compliance;
-    let soft = |k: usize| format!("{:.4e}", 1e6 * C[k][k]);
-    let softness = vec![
-        vec!["displacement of B under 1 kN".into(), soft(0), soft(1), soft(2), "mm".into()],
-        vec!["rotation of B under 1 kN m".into(), soft(3), soft(4), soft(5), "mrad".into()],
+        .map(|i| vec![i.name.clone(), i.rows.clone(), triple(&i.position_m), triple(&i.rpy_rad), i.from.into()]);
+    let header = ["interface", "rows", "position", "roll, pitch, yaw", "from"];
+    let number = |x: f64| format!("{x:.4e}");
+    let mut tables = vec![
+        ReportTable::new("interfaces (m, rad, link frame)", &header, interfaces.collect()),
+        summary.statics.mass_table("whole", &[], number),
     ];
+    tables.extend(summary.statics.stiffness_tables(number));
+
     let count = summary.frequencies_hz.len().max(summary.lumped_frequencies_hz.len());
     let hz = |list: &[f64], k: usize| list.get(k).map_or_else(|| "-".into(), |x| format!("{x:.2}"));
-    let frequencies = (0..count)
-        .map(|k| vec![(k + 1).to_string(), hz(&summary.frequencies_hz, k), hz(&summary.lumped_frequencies_hz, k)])
-        .collect();
-    let mut tables = vec![
-        table(
-            "interfaces (m, rad, link frame)",
-            &["interface", "rows", "position", "roll, pitch, yaw", "from"],
-            interfaces,
-        ),
-        table(
-            "mass",
-            &["", "mass [kg]", "centre of mass [m]", "ixx, iyy, izz, ixy, ixz, iyz about it [kg m2]"],
-            masses,
-        ),
-        table("deflection of B along the load, A held", &["", "x", "y", "z", ""], softness),
-        matrix_table("stiffness K_BB at B, A held (N/m, N/rad; N m/m, N m/rad)", &summary.stiffness),
-        matrix_table("compliance C_BB at B, A held (m/N, m/(N m); rad/N, rad/(N m))", &summary.compliance),
-        table("checks", &["", "measured", "usual", ""], check_rows(&summary.checks)),
-        table("natural frequencies, A held, B free (Hz)", &["mode", "matrices", "two parts"], frequencies),
-    ];
-    tables.extend(summary.modal.as_ref().map(modal_table));
+    let mode =
+        |k: usize| vec![(k + 1).to_string(), hz(&summary.frequencies_hz, k), hz(&summary.lumped_frequencies_hz, k)];
+    let (title, frequencies) = ("natural frequencies, A held, B free (Hz)", (0..count).map(mode).collect());
+    tables.push(ReportTable::new("checks", &["", "measured", "usual", ""], check_rows(&summary.checks)));
+    tables.push(ReportTable::new(title, &["mode", "matrices", "two parts"], frequencies));
+    tables.extend(summary.modal.as_ref().map(ModalFigures::table));
     tables
 }
 
 /// Returns the checks with their usual values.
 fn check_rows(c: &ImportChecks) -> Vec<Vec<String>> {
     let limits = GateLimits::default();
-    let below = |name: &str, value: f64, usual: f64| {
-        let mark = if value <= usual { "ok" } else { "warn" };
-        vec![name.to_owned(), format!("{value:.1e}"), format!("below {usual:.0e}"), mark.into()]
-    };
     let mut checks = vec![
         // A DMIG has nine decimals.
         below("asymmetry of the stiffness", c.symmetry, 1e-8),

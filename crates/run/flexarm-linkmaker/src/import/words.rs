@@ -1,5 +1,9 @@
 //! Parsing of import options: rows or nodes of the interfaces, their frames, masses, position of
 //! the joint.
+//!
+//! Rows and nodes are counted as in the file, lengths are in its unit; masses are in SI. Not here:
+//! values shared with a reduction (`reduce/words.rs`), the map of rows itself
+//! (`flexarm_fe_io::exchange::InterfaceMap`).
 
 use std::fmt;
 use std::str::FromStr;

@@ -1,4 +1,7 @@
 //! Paths and names of the files of a reduction.
+//!
+//! All paths are checked before the work starts, and again before anything is written. Not here:
+//! writing all files or none (`flexarm-files`), their contents.
 
 use std::path::{Component, Path, PathBuf};
 

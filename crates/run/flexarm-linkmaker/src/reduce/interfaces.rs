@@ -1,5 +1,9 @@
 //! Maps the interfaces of a job to nodes and frames of a mesh, with messages that contain the text
 //! to type.
+//!
+//! Start at [`MeshFrame::choose`]. M is the frame of the mesh, L the link, I an interface; node
+//! selections are in M, poses and centroids in L (m). Not here: the selectors themselves
+//! (`flexarm_fem::mesh::select`), ties (`flexarm_fem::reduction`).
 
 use flexarm_fem::mesh::{Surface, SurfaceNodes, select};
 use flexarm_fem::reduction::{Interface, Tie};
@@ -29,6 +33,7 @@ impl SelectedInterface {
     /// Returns warnings about nodes that do not form a seat: corners without mid-side nodes, edges,
     /// nodes inside.
     pub(super) fn node_warnings(&self) -> Vec<String> {
+        // Corners without mid-side nodes; no face at all, or nodes beside the faces; nodes inside.
         let (name, on_surface, chosen) = (&self.interface.name, &self.on_surface, self.chosen_nodes);
         let mut findings = Vec::new();
         if !on_surface.missing.is_empty() {
@@ -172,6 +177,7 @@ impl MeshFrame<'_> {
         if let Some(angle) = entry.rpy.iter().flatten().find(|angle| angle.abs() > std::f64::consts::TAU) {
             return Err(fail(format!("rpy has {angle} rad, more than a turn: angles are in rad, are these degrees?")));
         }
+        // Exactly one position: coordinates, centroid, joint, or by default that of the robot's joint.
         let turned = |position: Vector3<f64>| {
             let frame = FrameEntry { xyz: (position / self.unit).into(), rpy: entry.rpy.unwrap_or_default() };
             pose(&frame, self.unit)

@@ -2,7 +2,8 @@
 //! struct that overrides it.
 //!
 //! Unknown keys are errors. Lengths are in the unit of the mesh, positions in the link frame,
-//! angles in rad.
+//! angles in rad. Not here: notations of single values (`words.rs`), checks against the mesh
+//! (`prepare.rs`).
 
 use std::collections::BTreeMap;
 use std::io::Read;

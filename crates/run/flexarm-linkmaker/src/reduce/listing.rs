@@ -1,4 +1,7 @@
 //! Contents of a mesh for the choice of interfaces: sets, regions, sizes.
+//!
+//! Start at [`MeshListing`]. Lengths are in the unit of the mesh, so that they can be typed again;
+//! M is the frame of the mesh. Not here: the selection of nodes (`interfaces.rs`).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -76,6 +79,7 @@ pub struct SetListing {
 
 impl MeshListing {
     pub(super) fn new(path: &Path, file: &MeshFile, units: Option<String>, place: &MeshFrame<'_>) -> Self {
+        // Elements by kind, regions with the materials of the file.
         let mesh: &Mesh = &file.mesh;
         let mut element_kinds = BTreeMap::new();
         for block in &mesh.blocks {
@@ -88,6 +92,7 @@ impl MeshListing {
             material: region.material.as_ref().filter(|_| units.is_some()).map(MaterialFigures::new),
             has_material: region.material.is_some(),
         };
+        // A link is one connected body.
         let parts = connected_parts(mesh).len();
         let mut warnings = file.warnings.clone();
         if parts > 1 {

@@ -12,7 +12,7 @@
 //! let job = ReduceJob::load("lower_arm.reduce.toml".as_ref())?;
 //! let outputs = ReduceOutputs { folder: Some("out/lower_arm".into()), ..ReduceOutputs::default() };
 //! let summary = Reduction::open(&job, Some(&outputs), &mut |_| {})?.finish(None, &mut |_| {})?;
-//! println!("{:.2} kg, first frequency {:.1} Hz", summary.mass_kg, summary.frequencies_hz[0]);
+//! println!("{:.2} kg, first frequency {:.1} Hz", summary.statics.mass_kg, summary.frequencies_hz[0]);
 //! # Ok::<(), flexarm_linkmaker::LinkError>(())
 //! ```
 //!
@@ -47,18 +47,17 @@ use interfaces::MeshFrame;
 use prepare::{Prepared, failed, prepare, read};
 use summary::summary_of;
 
+pub use crate::figures::{CostFigures, ModalFigures, PartFigures, ReportTable, StaticFigures};
 pub use files::{ReduceOutputs, STRESS_FILE};
 pub use flexarm_fem::reduction::Tie;
 pub use flexarm_fem::{NodeSelector, UnitSystem as Units};
 pub use job::{FrameEntry, InterfaceEntry, ReduceJob, UrdfEntry};
 pub use listing::{MeshListing, RegionListing, SetListing};
-pub use report::{ReportTable, headline, markdown, modal_table, tables};
-pub(crate) use report::{matrix_table, warning_list};
+pub use report::{headline, markdown, tables};
 pub use summary::{
-    ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModalFigures, ModeFigures, PartFigures,
-    PhaseFigures, ReduceFiles, ReduceSummary, RegionFigures, SolverFigures,
+    ChainFigures, CheckFigures, InterfaceFigures, MaterialFigures, ModeFigures, PhaseFigures, ReduceFiles,
+    ReduceSummary, RegionFigures, SolverFigures,
 };
-pub(crate) use summary::{about, coarse, rows3, rows6};
 pub use urdf_link::{LinkJoint, UrdfLink};
 pub use words::{At, MaterialChoice, OrderingChoice, QuadratureChoice, SplitChoice, numbers};
 
@@ -141,13 +140,11 @@ impl Reduction {
         starts.push(stopwatch.wall_s());
 
         let mut summary = summary_of(&job, &plan, &file, units, &chosen, materials, &reduction);
-        let before = about(&summary.link, findings);
+        let before = crate::figures::about(&summary.link, findings);
         summary.caveats.splice(0..0, before);
         summary.warnings = warnings(&summary.caveats);
         summary.phases = phases(read_s, &starts);
-        summary.wall_s = stopwatch.wall_s();
-        summary.cpu_s = stopwatch.cpu_s();
-        summary.peak_rss_bytes = crate::stamp::peak_rss_bytes();
+        summary.cost = CostFigures::since(&stopwatch);
         if let Some(paths) = paths {
             let pictures = if paths.folder.is_some() { pictures(&file.mesh, &plan, &reduction)? } else { Vec::new() };
             let stress = reduction.stress.as_ref().map(write_stress);
@@ -274,6 +271,7 @@ fn write(
     contents: &Contents<'_>,
     summary: &mut ReduceSummary,
 ) -> Result<(), LinkError> {
+    // Paths, then texts, which contain the paths.
     let Contents { flex, stress, pictures } = *contents;
     let text = |path: &std::path::Path| Some(path.display().to_string());
     summary.files.flex = paths.flex().and_then(text);
@@ -289,6 +287,7 @@ fn write(
         json = serde_json::to_string_pretty(&summary).expect("plain numbers and strings") + "\n";
         page = markdown(summary);
     }
+    // All files at once: either all are written or none.
     let mut files: Vec<(std::path::PathBuf, &[u8])> = Vec::new();
     if let Some(folder) = &paths.folder {
         files.extend([

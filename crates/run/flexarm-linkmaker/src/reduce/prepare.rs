@@ -1,5 +1,9 @@
 //! Preparation of a job: a mesh with materials and a plan, with all checks made before the work
 //! starts.
+//!
+//! Start at [`prepare`]. All faults of a job are collected and reported together. M is the frame of
+//! the mesh, L the link; SI after reading. Not here: the job's keys (`job.rs`), the reduction
+//! (`flexarm_fem::reduce_mesh`).
 
 use flexarm_fe_io::mesh::{MeshFile, ReadOptions};
 use flexarm_fe_io::read_mesh;
@@ -61,6 +65,7 @@ pub(super) fn prepare(
     let units = units_of(job);
     let X_LM = job.mesh_frame.map_or_else(Pose::identity, |frame| pose(&frame, units.length));
 
+    // Faults of units, materials, names and interfaces, all in one error.
     let mut faults = Vec::new();
     if job.units.is_none() {
         faults.push(no_units(job, &file));
@@ -92,6 +97,7 @@ pub(super) fn prepare(
     if !faults.is_empty() {
         return Err(LinkError::of_all(faults));
     }
+    // Findings, then the plan with the mesh in link axes.
     let finding = |code: &'static str| move |sentence: String| Finding::warning(code, "", sentence, "");
     let mut findings: Vec<Finding> = warnings.into_iter().map(finding("mesh-file")).collect();
     findings.extend(chosen.iter().flat_map(SelectedInterface::node_warnings).map(finding("interface-nodes")));
@@ -100,6 +106,7 @@ pub(super) fn prepare(
     let mut plan = plan(job, &file, units, &chosen, &materials);
     plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
+    // The mass of the robot's link beyond that of the mesh, fixed to the two parts.
     if let (Some(robot), Some(entry)) = (robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
         let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
         let mesh = mass_properties(&file.mesh, &densities)
@@ -254,6 +261,7 @@ fn provenance(
     chosen: &[SelectedInterface],
     materials: &[RegionFigures],
 ) -> Provenance {
+    // One tie for all, or that of each interface.
     let ties: Vec<&str> = chosen.iter().map(|one| one.interface.tie.name()).collect();
     let tie = match ties.as_slice() {
         [first, rest @ ..] if rest.iter().all(|tie| tie == first) => (*first).to_owned(),

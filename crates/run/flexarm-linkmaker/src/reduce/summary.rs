@@ -1,13 +1,16 @@
-//! Figures of a reduction; the JSON keys are stable. SI units, link axes.
+//! Figures of a reduction; the JSON keys are stable.
+//!
+//! Start at [`ReduceSummary`]. A is the proximal and B the distal interface; SI units, link axes,
+//! linear first; errors are relative to the mesh. Not here: figures shared with an import
+//! ([`crate::figures`]), the tables of the figures (`report.rs`), the checks that compute them
+//! (`flexarm_fem::mesh_gate`).
 
 use flexarm_fe_io::mesh::MeshFile;
 use flexarm_fem::chain::Chain;
 use flexarm_fem::mesh_gate::ModeCheck;
 use flexarm_fem::sparse::Ordering;
-use flexarm_fem::{LinkPlan, Material, MeshGate, MeshReduction, ModalLink, ReducedLink, RigidPart, UnitSystem};
-use flexarm_settings::Setting;
+use flexarm_fem::{LinkPlan, Material, MeshGate, MeshReduction, ReducedLink, UnitSystem};
 use flexarm_settings::finding::{self, Finding};
-use nalgebra::{Matrix3, Matrix6};
 use serde::Serialize;
 
 use super::JUDGED_MODES;
@@ -15,6 +18,7 @@ use super::interfaces::SelectedInterface;
 use super::job::ReduceJob;
 use super::prepare::quadrature_name;
 use super::words::described;
+use crate::figures::{CostFigures, ModalFigures, PartFigures, StaticFigures, about, coarse};
 use crate::yardsticks;
 
 /// Result of `flexarm reduce`.
@@ -42,20 +46,9 @@ pub struct ReduceSummary {
     pub dofs: usize,
     /// Interfaces, proximal first.
     pub interfaces: Vec<InterfaceFigures>,
-    /// Mass of the whole link.
-    pub mass_kg: f64,
-    /// Centre of mass.
-    pub com_m: [f64; 3],
-    /// Inertia about the centre of mass, 3×3 (kg m²).
-    pub inertia: [[f64; 3]; 3],
-    /// Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad).
-    pub stiffness: [[f64; 6]; 6],
-    /// Inverse of the stiffness: displacement of B per unit load at B.
-    pub compliance: [[f64; 6]; 6],
-    /// Position of the elastic joint between the two parts.
-    pub split_m: [f64; 3],
-    /// The two rigid parts, proximal first.
-    pub parts: Vec<PartFigures>,
+    /// Mass of the mesh and stiffness of the link.
+    #[serde(flatten)]
+    pub statics: StaticFigures,
     /// Bodies attached to the link that are not in the mesh; included in `parts`, not in `mass_kg`.
     pub attached: Vec<PartFigures>,
     /// Chains of more parts in the link file.
@@ -74,12 +67,9 @@ pub struct ReduceSummary {
     pub solver: SolverFigures,
     /// Time of each step (s).
     pub phases: PhaseFigures,
-    /// Wall-clock time, excluding the writing of files (s).
-    pub wall_s: f64,
-    /// Processor time, all threads (s).
-    pub cpu_s: f64,
-    /// Peak memory of the process so far; null where the system does not report it.
-    pub peak_rss_bytes: Option<u64>,
+    /// Time and memory.
+    #[serde(flatten)]
+    pub cost: CostFigures,
     /// Warnings.
     pub warnings: Vec<String>,
     /// The same warnings with code, value and reference value.
@@ -176,23 +166,6 @@ impl MaterialFigures {
     }
 }
 
-/// A rigid part.
-#[derive(Clone, Debug, Serialize)]
-pub struct PartFigures {
-    /// Mass.
-    pub mass_kg: f64,
-    /// Centre of mass.
-    pub com_m: [f64; 3],
-    /// Inertia about the centre of mass, 3×3 (kg m²).
-    pub inertia: [[f64; 3]; 3],
-}
-
-impl From<&RigidPart> for PartFigures {
-    fn from(part: &RigidPart) -> Self {
-        Self { mass_kg: part.mass, com_m: part.com.into(), inertia: rows3(&part.inertia) }
-    }
-}
-
 /// A chain of rigid parts.
 #[derive(Clone, Debug, Serialize)]
 pub struct ChainFigures {
@@ -241,36 +214,6 @@ impl From<&ModeCheck> for ModeFigures {
             guyan_error: error(mode.guyan_hz),
             lumped_hz: mode.lumped_hz,
             lumped_error: error(mode.lumped_hz),
-        }
-    }
-}
-
-/// Figures of a modal link: `model = "modal"` of a robot file.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ModalFigures {
-    /// Number of generalised coordinates: six per interface except A, then modes.
-    pub coordinates: usize,
-    /// Interfaces except A, distal first.
-    pub interfaces: Vec<String>,
-    /// Mass, without attached bodies.
-    pub mass_kg: f64,
-    /// Whether the second-order integrals are known.
-    pub second_order: bool,
-    /// Whether the geometric stiffness is stored (`geometric_stiffening = true` of a robot file).
-    pub geometric: bool,
-    /// All natural frequencies with A held (Hz).
-    pub frequencies_hz: Vec<f64>,
-}
-
-impl From<&ModalLink> for ModalFigures {
-    fn from(link: &ModalLink) -> Self {
-        Self {
-            coordinates: link.coordinates(),
-            interfaces: link.interfaces.iter().map(|interface| interface.name.clone()).collect(),
-            mass_kg: link.mass,
-            second_order: link.has_second_order(),
-            geometric: link.geometric.is_some(),
-            frequencies_hz: link.held_frequencies_hz(),
         }
     }
 }
@@ -416,13 +359,7 @@ pub(super) fn summary_of(
         elements: file.mesh.element_count(),
         dofs: reduction.solver.dofs,
         interfaces: chosen.iter().map(InterfaceFigures::from).collect(),
-        mass_kg: reduction.whole.mass,
-        com_m: reduction.whole.com.into(),
-        inertia: rows3(&reduction.whole.inertia),
-        stiffness: rows6(&link.K_BB),
-        compliance: link.tip_compliance().map_or([[f64::NAN; 6]; 6], |C| rows6(&C)),
-        split_m: link.split.X_LS.translation.vector.into(),
-        parts: vec![PartFigures::from(&link.proximal), PartFigures::from(&link.distal)],
+        statics: StaticFigures::new(link, &reduction.whole),
         attached: plan.attached.iter().map(PartFigures::from).collect(),
         // Chains of the mesh without attached bodies.
         chains: reduction.bare_chains.iter().map(|chain| ChainFigures::new(chain, JUDGED_MODES)).collect(),
@@ -433,9 +370,7 @@ pub(super) fn summary_of(
         checks: gate.map(|gate| CheckFigures::of(gate, link)).unwrap_or_default(),
         solver: SolverFigures::from(reduction),
         phases: PhaseFigures::default(),
-        wall_s: 0.0,
-        cpu_s: 0.0,
-        peak_rss_bytes: None,
+        cost: CostFigures::default(),
         warnings: finding::warnings(&caveats),
         caveats,
         files: ReduceFiles::default(),
@@ -473,45 +408,4 @@ fn spreads(chosen: &[SelectedInterface], nodes: usize) -> Vec<Finding> {
     let judged =
         |one: &SelectedInterface| yardsticks::of_interface(&one.interface.name, along(one) / length, share(one));
     chosen.iter().filter_map(judged).collect()
-}
-
-/// Relative errors of the first frequency above which a model is reported as too coarse.
-const COARSE_PARTS: f64 = 0.05;
-const MODES_MISS: f64 = 0.005;
-
-/// Returns warnings about reduced models with an inaccurate first frequency.
-///
-/// * `source`: origin of the reference frequency: the mesh, or the matrices.
-/// * `parts`, `modes`: relative errors of the two rigid parts and of the kept modes.
-pub(crate) fn coarse(source: &str, parts: Option<f64>, modes: Option<f64>) -> Vec<Finding> {
-    let off = |error: Option<f64>, bound: f64| error.filter(|error| error.abs() > bound);
-    let parts = off(parts, COARSE_PARTS).map(|error| {
-        let percent = 100.0 * error;
-        let said = format!(
-            "the first frequency with two rigid parts differs from that of {source} by {percent:+.1} %, as it will \
-             in a simulation with them"
-        );
-        Finding::warning("coarse-parts", "", said, "").measured(error, COARSE_PARTS)
-    });
-    let modes = off(modes, MODES_MISS).map(|error| {
-        let percent = 100.0 * error;
-        let setting = Setting::Modes;
-        let said =
-            format!("the first frequency with the kept modes differs by {percent:+.2} %: keep more modes ({setting})");
-        Finding::warning("coarse-modes", "", said, "").measured(error, MODES_MISS).mended_by(&[Setting::Modes])
-    });
-    parts.into_iter().chain(modes).collect()
-}
-
-/// Names the link in warnings about it.
-pub(crate) fn about(link: &str, findings: Vec<Finding>) -> Vec<Finding> {
-    findings.into_iter().map(|finding| Finding { location: link.into(), ..finding }).collect()
-}
-
-pub(crate) fn rows3(M: &Matrix3<f64>) -> [[f64; 3]; 3] {
-    M.transpose().into()
-}
-
-pub(crate) fn rows6(M: &Matrix6<f64>) -> [[f64; 6]; 6] {
-    M.transpose().into()
 }

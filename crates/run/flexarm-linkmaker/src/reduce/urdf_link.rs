@@ -1,4 +1,6 @@
-//! Data of the link from a robot file.
+//! Data of the link from a robot: frames of its joints and its mass, as numbers.
+//!
+//! Not here: reading the robot (`flexarm_run::reduce`), which this crate does not know.
 
 use flexarm_fem::RigidPart;
 use flexarm_fem::matrix_link::halves_of_bar;

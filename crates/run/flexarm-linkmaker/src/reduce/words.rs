@@ -1,4 +1,7 @@
-//! Values of a reduction job with several notations.
+//! Values of a reduction job with several notations: text on a command line, TOML in a job file.
+//!
+//! Each type has [`FromStr`] for the one and serde for the other, with the same messages. Not here:
+//! the job ([`super::ReduceJob`]), values that only an import has (`import/words.rs`).
 
 use std::fmt;
 use std::str::FromStr;
@@ -49,7 +52,10 @@ impl FromStr for MaterialChoice {
         if !text.contains(',') {
             return Self::named(text.trim());
         }
-        Self::given(<[f64; 3]>::try_from(numbers(text)?).map_err(|_| Self::unknown(text))?)
+        match numbers(text)?[..] {
+            [young, nu, rho] => Self::given([young, nu, rho]),
+            _ => Err(Self::unknown(text)),
+        }
     }
 }
 
@@ -139,9 +145,9 @@ impl FromStr for SplitChoice {
         match text.trim() {
             "elastic-centre" | "elastic-center" => Ok(Self::ElasticCentre),
             "mid" => Ok(Self::Mid),
-            other => match numbers(other).map_err(|_| wrong())?.as_slice() {
-                [x] => Self::fraction(*x),
-                [x, y, z] => Ok(Self::Point([*x, *y, *z])),
+            other => match numbers(other).as_deref() {
+                Ok([x]) => Self::fraction(*x),
+                Ok([x, y, z]) => Ok(Self::Point([*x, *y, *z])),
                 _ => Err(wrong()),
             },
         }

@@ -1,4 +1,9 @@
 //! A robot with its links and drives modelled, built once and used for many runs and poses.
+//!
+//! [`Arm`] is the immutable model: one tree, its springs in coordinate order with their owners, the
+//! rigid twin. [`Arm::plant`] adds a motion for the steppers. Coordinates are actuated joints first,
+//! then elastic groups; SI units, points in the axes of the named frame.
+//! Not here: how the springs are made (`modelled.rs`), the equations of motion (`flexarm-stepping`).
 
 pub(crate) mod bends;
 pub(crate) mod deflections;
@@ -164,6 +169,9 @@ impl Arm {
 
     /// Names the elastic bodies and torque-driven joints without inertia in some direction: rows of
     /// the mass matrix that depend linearly on earlier rows.
+    ///
+    /// Cholesky factor `L Lᵀ` of the rows of the free coordinates; a row whose pivot
+    /// `M_ii - Σ L_ik²` vanishes is named and left out.
     fn without_inertia(&self) -> Vec<String> {
         /// Threshold for the pivot relative to the diagonal entry; below it a row counts as
         /// dependent.
@@ -196,8 +204,13 @@ impl Arm {
         names
     }
 
-    /// Inertia that each torque-driven joint sees when all other free coordinates are free to
-    /// accelerate: `1 / (M_ff^-1)_ii`.
+    /// Returns the inertia that each torque-driven joint sees when all other free coordinates are free
+    /// to accelerate, with the joints at `actuated` (rad or m) and no deflection (kg m² or kg):
+    ///
+    /// ```text
+    /// 1 / (M_ff⁻¹)_ii,    f: torque-driven and elastic coordinates
+    /// ```
+    /// 0 where the mass matrix is singular.
     pub(crate) fn quick_inertia(&self, actuated: &DVector<f64>) -> Vec<f64> {
         let (model, n) = (&self.model, self.model.n_actuated());
         let mut q = DVector::zeros(model.nv());

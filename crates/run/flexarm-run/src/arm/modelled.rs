@@ -53,6 +53,7 @@ impl Robot {
 
     /// As [`Robot::model`], without a copy of the robot.
     pub(crate) fn modelled(self: Arc<Self>, modelling: &Modelling) -> Result<Arm, Error> {
+        // The tree: links, then gearboxes, then the springs under the base.
         let ChosenLinks { links, findings, modal_instead } = self.chosen_links(modelling)?;
         let mut substituted = substitute(&self.rigid, &links).map_err(refused)?;
         let bends = bends(&substituted);
@@ -63,11 +64,13 @@ impl Robot {
         let model = Model::new(&substituted.mechanism)
             .map_err(|source| Error::Model { path: self.urdf_path.clone(), source: Box::new(source) })?;
 
+        // Its springs with their owners, in the order of the elastic coordinates.
         let mut owned = self.link_springs(&links, &substituted.spans);
         owned.extend(self.gear_springs(&gears, &model));
         let mounting = mounted.as_ref().map(|_| substituted.spans.len() - 1);
         owned.extend(mounted.into_iter().flatten());
         let (springs, owners) = in_coordinate_order(&model, owned)?;
+        // What acts on the joints besides springs.
         let (friction, torque) = self.actuation(&model, modelling.drives);
         let gears = self.gear_laws(&model, &owners);
         Ok(Arm {

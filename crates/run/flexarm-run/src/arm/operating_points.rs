@@ -1,4 +1,8 @@
 //! Equilibrium, compliance and frequencies at any number of poses, on all cores.
+//!
+//! Start at [`Arm::operating_points`]. Results are arrays of numbers, pose by pose; world axes at the
+//! TCP, linear first. Not here: the solution at a pose (`flexarm_stepping::OperatingPoint`), one pose
+//! with its shapes ([`Arm::statics`], [`Arm::modes`]).
 
 use flexarm_kinematics::Wrench;
 use flexarm_stepping::{OperatingPoint, PoseOutputs, StepError};

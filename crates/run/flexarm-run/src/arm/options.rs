@@ -1,4 +1,7 @@
-//! Options of a run, with usable defaults.
+//! Options of models and runs, with usable defaults: plain data, checked where they are used.
+//!
+//! Not here: settings of single steppers (`run/stepper_settings.rs`), the motion and its loads
+//! ([`crate::Scenario`]).
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;

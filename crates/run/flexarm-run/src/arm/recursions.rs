@@ -21,7 +21,7 @@ use crate::motions::applied_load::unknown_frame;
 use crate::robot::Robot;
 use crate::robot::loops;
 
-/// Number of rows above which threads share the work; below, waking them costs more.
+/// Number of rows from which on threads share the work; below, waking them costs more.
 const MANY: usize = 256;
 /// Number of rows per task of a thread.
 const CHUNK: usize = 64;
@@ -216,6 +216,7 @@ impl Recursions {
         if let Some(wrong) = inputs.iter().find(|input| input.len() != m * n) {
             return Err(Error::samples(wrong.len(), m, n));
         }
+        // Row by row in one workspace; a pose in which a loop does not close ends the work.
         let row = |k: usize| inputs.map(|input| &input[k * n..][..n]);
         let several = |space: &mut Space, first: usize, out: &mut [f64]| -> Result<(), Error> {
             for (k, out) in out.chunks_exact_mut(width).enumerate() {
@@ -228,6 +229,7 @@ impl Recursions {
             }
             Ok(())
         };
+        // Few rows in a workspace that is kept, many on all cores in workspaces of their own.
         if m < MANY {
             let mut space = self.take();
             let done = several(&mut space, 0, out);

@@ -1,5 +1,8 @@
 //! Caveats about balancers relative to the weight they carry, and about their range of length over
 //! the joint ranges.
+//!
+//! Start at [`of_balancers`]; each balancer is compared with the robot without any. Not here:
+//! balancers out of range at a pose, which are errors ([`crate::robot::balancer`]).
 
 use flexarm_kinematics::{BalancerLaw, BalancerSpan, Data, Mechanism, Model, forward_kinematics, gravity_forces};
 use nalgebra::DVector;
@@ -25,6 +28,7 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Finding>
     let weight = weights.fold(0.0, f64::max);
     let mut caveats = Vec::new();
     for (k, balancer) in rigid.balancers().iter().enumerate() {
+        // Length over the joint ranges: room of the gas, end of the curve.
         let name = format!("balancer {:?}", balancer.name);
         let Lengths { least, most } = lengths(rigid, k);
         match &balancer.law {
@@ -42,6 +46,7 @@ pub(crate) fn of_balancers(mechanism: &Mechanism, rigid: &Model) -> Vec<Finding>
             }
             _ => {}
         }
+        // Torque on the joint it acts on most: too strong, too weak, or against the weight's side.
         let alone = alone(mechanism, &bare, k);
         let torque = alone.torque;
         if weight > 0.0 && torque > STRONG[0] * weight {

@@ -1,4 +1,7 @@
 //! Caveats about the links that carry TCP and payload, and about rigid joints among elastic ones.
+//!
+//! Start at [`of_chain`]: a walk from a link to the base, and over all that it carries. Not here:
+//! distances and masses of TCP and payload (`parts.rs`).
 
 use flexarm_kinematics::{Joint, Mechanism};
 

@@ -1,5 +1,9 @@
 //! Caveats about the drives of a robot file: gear stiffness relative to the effort limit, backlash,
 //! ratio, rotor, friction, gains.
+//!
+//! Start at [`of_drives`]; [`give`], [`speed_loop`] and [`integral`] judge an arm at rest. Quantities
+//! are on the joint's side of the gear (N m, rad). Not here: drives with an error
+//! (`robot/drive_entry.rs`), the arm at rest itself (`pose.rs`).
 
 use std::ops::RangeInclusive;
 
@@ -140,6 +144,7 @@ fn others_turn(drive: &Drive, drives: &[Drive], mechanism: &Mechanism) -> Option
 /// other gears (rad).
 fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Finding> {
     let (Some((k, along)), Some((springs, gear))) = (stiffness(drive), &drive.gearbox) else { return Vec::new() };
+    // Rotation under the effort limit: of all strong gears, and against the robot's other gears.
     let mut caveats = Vec::new();
     let turned = effort / k;
     let [unusual, wrong] = if effort > STRONG { TURNED } else { TURNED_WEAK };
@@ -157,10 +162,12 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Finding> {
         let caveat = kinds::GEAR_STIFF.found(name(drive), turned, RIGID[0]).likely(likely());
         caveats.push(if turned < RIGID[1] { caveat } else { caveat.as_note() });
     }
+    // Translations of bearings against their rotations.
     if let Some(along) = along {
         let factors = &[(1e3, "translations in kN/m or N/mm"), (1.0 / 57.3, "rotations per degree")];
         caveats.extend(outside(&kinds::LEVER, name(drive), (k / along).sqrt(), &LEVER, factors, 0.5));
     }
+    // Damping over stiffness: none, so much that it creeps, or almost none.
     if gear.dampers.as_ref().is_some_and(|dampers| dampers.iter().all(|damper| *damper == 0.0)) {
         caveats.push(kinds::NO_DAMPING.found(name(drive), 0.0, USUAL_DAMPING));
     }
@@ -172,6 +179,7 @@ fn gear(drive: &Drive, effort: f64, others: Option<f64>) -> Vec<Finding> {
     let least = relaxations.into_iter().filter(|time| *time > 0.0).fold(f64::INFINITY, f64::min);
     let factors = &[(1e-3, "kN m s/rad or per ms"), (1.0 / slip::DEGREES, "N m s/deg")];
     caveats.extend(outside(&kinds::GEAR_UNDAMPED, name(drive), least, &(UNDAMPED..=f64::INFINITY), factors, 1.0));
+    // Backlash.
     let [play, _] = drive.play(false);
     if play > PLAY[0] {
         let likely = slip(play, &(0.0..=PLAY[0]), slip::ANGLE, 1.0);

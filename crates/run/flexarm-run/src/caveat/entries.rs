@@ -1,4 +1,7 @@
 //! Caveats about strengths, gauges, guides and calibrations of a robot file.
+//!
+//! Start at [`of_entries`]. SI units; places of gauges in link axes. Not here: entries with an error
+//! (`robot/*_entry.rs`).
 
 use std::ops::RangeInclusive;
 
@@ -98,6 +101,7 @@ fn of_gauge(gauge: &Gauge, links: &[RobotLink]) -> Vec<Finding> {
 
 /// Checks the guides of telescopic joints against size and weight of the robot.
 fn of_guides(robot: &Robot) -> Vec<Finding> {
+    // The moment of the whole weight at full reach, for which the tilts are judged.
     let size = Size::of(&robot.rigid);
     let moment = 9.81 * size.mass * size.extent;
     let mut caveats = Vec::new();
@@ -111,6 +115,7 @@ fn of_guides(robot: &Robot) -> Vec<Finding> {
         let Some(joint) = robot.rigid.joint(&drive.joint) else { continue };
         let tilts = drive.gearbox.iter().flat_map(|(_, damping)| &damping.tilts);
         for tilt in tilts {
+            // Tilt under that moment at the largest overlap of the tubes.
             let name = |what: &str| name(&format!("{}.{what}", tilt.axis));
             let ends = [joint.limits.lower, joint.limits.upper].into_iter().filter(|q| q.is_finite());
             let overlap = ends.map(|q| tubes.overlap(q)).fold(tubes.overlap(0.0).abs(), f64::max);

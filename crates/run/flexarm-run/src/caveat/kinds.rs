@@ -1,5 +1,9 @@
 //! Catalogue of caveats: code, message, unit and help. `docs/caveats.md` gives the source of each
 //! threshold.
+//!
+//! In a message `{value}` is what was found and `{yardstick}` what it is compared with; names in
+//! braces such as `{step_s}` are settings, which each interface names in its own terms. Not here:
+//! thresholds and the rules that use them (the other files of this folder).
 
 use super::FindingKind;
 pub(crate) use super::kinds_of_entries::*;
@@ -588,5 +592,3 @@ pub(crate) const DAMPED_MODE: FindingKind = FindingKind::warning(
     "",
     "arms have 0.01 to 0.1: check damping of links and gearboxes",
 );
-
-// Identification.

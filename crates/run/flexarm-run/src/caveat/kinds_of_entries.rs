@@ -1,4 +1,4 @@
-//! Catalogue of caveats about strengths, gauges, guides and calibrations.
+//! Catalogue of caveats about strengths, gauges, guides and calibrations; part of [`super::kinds`].
 
 use super::FindingKind;
 

@@ -1,4 +1,4 @@
-//! Catalogue of caveats about motions, loads, balancers and closed loops.
+//! Catalogue of caveats about motions, loads, balancers and closed loops; part of [`super::kinds`].
 
 use super::FindingKind;
 

@@ -1,5 +1,8 @@
 //! Caveats about beams and damping in a robot file: material, section relative to length, mass
 //! relative to the section's.
+//!
+//! Start at [`of_link`] and [`of_mounting`]. Not here: a 6×6 given for a link (`stiffness.rs`), rigid
+//! parts against the mesh (`lumping.rs`).
 
 use std::ops::RangeInclusive;
 

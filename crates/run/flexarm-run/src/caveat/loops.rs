@@ -1,4 +1,6 @@
 //! Caveats about closed loops: transmission angles over the joint ranges and along a motion.
+//!
+//! Not here: loops that do not close or pass a dead point, which are errors ([`crate::robot::loops`]).
 
 use flexarm_kinematics::Model;
 use flexarm_trajectory::Trajectory;

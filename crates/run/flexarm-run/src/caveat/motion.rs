@@ -1,5 +1,8 @@
 //! Caveats about a motion on the robot that follows it, and about loads on the robot that carries
 //! them.
+//!
+//! Start at [`of_motion`] and [`of_loads`]. The rigid robot is followed at 201 times. Not here: joint
+//! limits that a motion passes, which are errors (`motions/motion.rs`).
 
 use flexarm_kinematics::{Data, Model, State, inverse_dynamics};
 use flexarm_stepping::Load;
@@ -30,6 +33,7 @@ const EARTH: f64 = 9.81;
 
 /// Checks the torques and speeds of the rigid robot along a motion.
 pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> Vec<Finding> {
+    // Maximum torque and speed, and range of each joint.
     let n = model.nv();
     let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
     let (mut torque, mut speed) = (vec![0.0f64; n], vec![0.0f64; n]);
@@ -44,6 +48,7 @@ pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> V
             range[k] = [range[k][0].min(state.q[k]), range[k][1].max(state.q[k])];
         }
     }
+    // Torques above the effort limits.
     let mut caveats = super::loops::of_motion(trajectory, model);
     for (c, torque) in model.coordinates().iter().zip(&torque) {
         if *torque > c.limits.effort {
@@ -52,6 +57,7 @@ pub(crate) fn of_motion(name: &str, trajectory: &Trajectory, model: &Model) -> V
             caveats.push(if *torque > HASTE * c.limits.effort { caveat } else { caveat.as_note() });
         }
     }
+    // A motion that is slow, rests or hardly moves, as in other units of time or angle.
     let used = model.coordinates().iter().zip(&speed).filter(|(c, _)| c.limits.velocity.is_finite());
     let used = used.map(|(c, v)| v / c.limits.velocity).fold(0.0, f64::max);
     let turns = model.coordinates().iter().zip(&range).filter(|(c, _)| !c.slides());

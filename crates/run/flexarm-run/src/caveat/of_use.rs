@@ -1,4 +1,7 @@
 //! Caveats that every command reports about its robot, motion and loads.
+//!
+//! Start at [`Arm::caveats`]: what holds for the robot, then for its use by the command, without
+//! duplicates. Not here: caveats of a finished run, which need its results (`run/summary.rs`).
 
 use std::sync::Arc;
 
@@ -36,6 +39,7 @@ impl Arm {
     /// duplicates.
     pub fn caveats(self: &Arc<Self>, used: Use<'_>) -> Vec<Finding> {
         let (arm, robot) = (self, self.robot());
+        // The robot, then its use, with the pose in which the use begins.
         let mut caveats = of_model(arm);
         let (pose, wrench) = match used {
             Use::Held(at, wrench) => (Ok(at.to_vec()), *wrench),
@@ -50,6 +54,7 @@ impl Arm {
                 (standing_pose(robot, own.as_ref()), [0.0; 6])
             }
         };
+        // The arm at rest in that pose.
         let standing = pose.and_then(|at| {
             let posed = Posed::new(arm.clone(), at)?;
             let linear = posed.linear(&Vector6::from(wrench))?;

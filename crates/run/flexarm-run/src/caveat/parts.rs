@@ -1,4 +1,8 @@
 //! Caveats about TCP, payload, gravity, masses and limits, judged by the size of the robot.
+//!
+//! Start at [`of_robot`]. Thresholds are multiples of the arm's reach, mass and weight ([`Size`]), so
+//! that they hold for small arms and cranes. Not here: which link carries TCP and payload
+//! (`chain.rs`), drives and flexible links.
 
 use flexarm_kinematics::{Joint, Link, LinkInertia, Mechanism, Model};
 use flexarm_linkmaker::yardsticks::OSMIUM;
@@ -156,6 +160,7 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
     if inertia.mass <= 0.0 {
         return caveats;
     }
+    // Mass, against that of the robot.
     let share = inertia.mass / size.mass;
     let share = if weighs { share } else { share / WEIGHTLESS };
     if share > PAYLOAD_SHARE.1 {
@@ -163,6 +168,7 @@ pub(crate) fn payload(what: &str, inertia: &LinkInertia, size: &Size, weighs: bo
         let likely = slip(inertia.mass, &(0.0..=2.0 * size.mass), slip::MASS, 1.0);
         caveats.push(if share > PAYLOAD_SHARE.0 { caveat.likely(likely) } else { caveat.as_note() });
     }
+    // Inertia: a point, an impossible body, one larger than the arm, one denser than any metal.
     let mut moments: [f64; 3] = inertia.inertia_com.symmetric_eigenvalues().into();
     moments.sort_by(f64::total_cmp);
     let [low, middle, high] = moments;

@@ -1,4 +1,7 @@
-//! Caveats about the arm at rest in a pose: sag, first natural frequency, deflection of gears.
+//! Caveats about the arm at rest in a pose: sag, first natural frequency, deflection of gears, gains.
+//!
+//! Start at [`ArmAtRest::caveats`]. Not here: equilibrium and modes (`poses/posed.rs`), the thresholds
+//! of single gears (`drives.rs`).
 
 use flexarm_stepping::Plant;
 

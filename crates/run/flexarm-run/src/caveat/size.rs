@@ -1,4 +1,7 @@
 //! Size and mass of a robot, from which its own thresholds follow.
+//!
+//! Torques and inertias are evaluated over poses spread evenly over the joint ranges, the same in every
+//! call ([`spread_poses`]). Not here: thresholds.
 
 use std::collections::HashMap;
 
@@ -54,18 +57,18 @@ impl Size {
     }
 }
 
-/// Maximum radius of gyration of a body (m).
+/// Returns the maximum radius of gyration of a body about its centre of mass (m): `√(I_max/m)`.
 pub(crate) fn gyration(inertia: &LinkInertia) -> f64 {
     let largest = inertia.inertia_com.symmetric_eigenvalues().max();
     (largest.max(0.0) / inertia.mass).sqrt()
 }
 
-/// Minimum density of a body with this mass and inertia (kg/m³).
+/// Returns the minimum density of a body with this mass and inertia (kg/m³).
 pub(crate) fn least_density(inertia: &LinkInertia) -> f64 {
     flexarm_linkmaker::yardsticks::least_density(inertia.mass, &inertia.inertia_com)
 }
 
-/// Maximum gravity and balancer torque of each joint of the rigid robot, over poses spread over the
+/// Returns the maximum gravity and balancer torque of each joint of the rigid robot, over poses spread over the
 /// joint ranges (N m or N).
 pub(crate) fn weight_carried(model: &Model) -> DVector<f64> {
     let mut data = Data::new(model);
@@ -80,7 +83,7 @@ pub(crate) fn weight_carried(model: &Model) -> DVector<f64> {
     weight
 }
 
-/// Inertia moved by each joint in the middle of the ranges, including rotors (kg m² or kg).
+/// Returns the inertia moved by each joint in the middle of the ranges, including rotors (kg m² or kg).
 pub(crate) fn inertia_moved(model: &Model) -> DVector<f64> {
     let limits = |k: usize| &model.coordinates()[k].limits;
     let q = DVector::from_fn(model.nv(), |k, _| middle(limits(k).lower, limits(k).upper));
@@ -98,12 +101,18 @@ pub(crate) fn spread_poses(model: &Model) -> impl Iterator<Item = DVector<f64>> 
     (1..=POSES).map(move |pose| DVector::from_fn(model.nv(), |k, _| place(pose, k)))
 }
 
-/// Middle of a joint range; for an open range the value nearest to zero.
+/// Returns the middle of a joint range; for an open range the value nearest to zero.
 pub(crate) fn middle(lower: f64, upper: f64) -> f64 {
     if lower.is_finite() && upper.is_finite() { 0.5 * (lower + upper) } else { 0.0f64.max(lower).min(upper) }
 }
 
-/// Entry of the Halton sequence in the base assigned to a coordinate, between 0 and 1.
+/// Returns an entry of the Halton sequence in the base assigned to a coordinate, between 0 and 1: the
+/// digits of the index in that base, mirrored at the point.
+///
+/// * `index`: from 1 on. `coordinate`: from 0 on; from 16 on the bases repeat.
+///
+/// # Source
+/// Halton (1960), *Numer. Math.* 2, 84-90.
 pub fn halton(mut index: u32, coordinate: usize) -> f64 {
     const PRIMES: [u32; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
     let base = PRIMES[coordinate % PRIMES.len()];

@@ -1,4 +1,7 @@
 //! Unit errors and similar mistakes that explain a value wrong by a known factor.
+//!
+//! A table of factors holds the mistakes of one quantity, the most frequent first; [`slip`] names the
+//! first one whose correction makes a value plausible. Not here: which values are plausible.
 
 use std::ops::RangeInclusive;
 

@@ -1,5 +1,8 @@
 //! Caveats about the stiffness of links: values in a robot file compared with the beam or `.flex`
 //! file that they replace, and with the mass.
+//!
+//! Stiffnesses are 6×6 at the split in S axes, linear first. Start at [`of_stiffness`]. Not here:
+//! matrices that are no stiffness, which are errors (`flexarm_flexlink::spring_stiffness`).
 
 use flexarm_linkmaker::yardsticks::{SOUND, sound_speed};
 use nalgebra::{Matrix6, Vector6};
@@ -63,7 +66,8 @@ fn copied(link: &RobotLink) -> Option<String> {
     sources.iter().find_map(of)
 }
 
-/// Minimum and maximum ratio of a stiffness to another over all directions.
+/// Returns the minimum and maximum ratio of a stiffness to another over all directions: the eigenvalues
+/// of `L⁻¹ K L⁻ᵀ`, where `L Lᵀ` is the other. `None` if either is not positive definite.
 fn ratios(K: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<[f64; 2]> {
     let L = other.cholesky()?.l();
     let half = L.solve_lower_triangular(K)?;
@@ -73,7 +77,7 @@ fn ratios(K: &Matrix6<f64>, other: &Matrix6<f64>) -> Option<[f64; 2]> {
     both.iter().all(|x| x.is_finite() && *x > 0.0).then_some(both)
 }
 
-/// Maximum coupling term relative to the geometric mean of its diagonal terms.
+/// Returns the maximum coupling term relative to the geometric mean of its diagonal terms.
 fn coupling(K: &Matrix6<f64>) -> f64 {
     let root: Vector6<f64> = K.diagonal().map(f64::sqrt);
     let scaled = Matrix6::from_fn(|i, j| if i == j { 0.0 } else { K[(i, j)] / (root[i] * root[j]) });

@@ -1,5 +1,8 @@
 //! Validity of the models: deflections, strains, drive torques, sampling. Used by runs, statics and
 //! `check`.
+//!
+//! Each function judges one number and returns its caveat. Not here: the numbers (`run/monitor`),
+//! probable errors in the input (the other files of this folder).
 
 use std::f64::consts::TAU;
 

@@ -1,4 +1,9 @@
 //! Balancer entries of a robot file: from the text to checked values.
+//!
+//! An entry names its two ends or one joint, and one force: spring, gas, gas spring, sine or curve.
+//! Forces between points are tensions over a length (N, m), over a joint torques on it (N m, rad);
+//! the law takes the tension, so the sign changes. Start at [`add_balancers`]. Not here: the robot's
+//! balancers ([`crate::robot::balancer`]), the laws themselves (`flexarm_kinematics::BalancerLaw`).
 
 use std::f64::consts::PI;
 use std::ops::{Range, RangeInclusive};
@@ -157,6 +162,7 @@ fn balancer(
     place: &Range<usize>,
     source: &Source,
 ) -> Result<RobotBalancer, RobotFileError> {
+    // Two points or one joint.
     let name = entry.name.as_ref().map_or_else(|| format!("balancer_{number}"), |name| name.get_ref().clone());
     let fail = |span: Range<usize>, what: String| source.error(span, format!("balancer {name:?}: {what}"));
     let ends = match (&entry.from, &entry.to, &entry.joint) {
@@ -171,6 +177,7 @@ fn balancer(
             return Err(fail(place.clone(), what.into()));
         }
     };
+    // Exactly one force law.
     let law = Law { over_joint: matches!(ends, BalancerEnds::Joint(_)), fail: &fail };
     let given = [
         entry.spring.as_ref().map(|spring| law.spring(spring)),
@@ -268,6 +275,7 @@ impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
                 return Err((self.fail)(gas.acts.span(), what));
             }
         };
+        // State of the gas at the given length.
         let pressure = self.positive(&at, "pressure", gas.pressure, "Pa")?;
         let volume = self.positive(&at, "volume", gas.volume, "m³")?;
         let length = self.positive(&at, "length", gas.length, "m")?;
@@ -275,6 +283,7 @@ impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
         let ambient = gas.ambient_pressure;
         let expected = "0 or a positive number in Pa, below the pressure";
         self.number(&at, "ambient_pressure", ambient, (0.0..pressure).contains(&ambient), expected)?;
+        // Area on which the pressure acts: given, or a piston less its rod.
         let area = match (gas.area, gas.piston_diameter, gas.rod_diameter) {
             (Some(area), None, None) => self.positive(&at, "area", area, "m²")?,
             (None, Some(piston), rod) => {
@@ -289,6 +298,7 @@ impl<F: Fn(Range<usize>, String) -> RobotFileError> Law<'_, F> {
                 return Err((self.fail)(at, what.into()));
             }
         };
+        // F = A p (V0/V)^n with V = V0 ± A (l - l0): relative to the state at l0 only A/V0 counts.
         Ok(BalancerLaw::Gas(GasLaw {
             force: pressure * area,
             opposing: ambient * area,

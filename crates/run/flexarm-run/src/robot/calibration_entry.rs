@@ -78,6 +78,7 @@ fn calibration(
     mechanisms: &[&mut Mechanism],
     source: &Source,
 ) -> Result<Calibration, TextFileError> {
+    // The joint: moving, and named once.
     let name = entry.joint.get_ref();
     let fail = |message: String| source.error(entry.joint.span(), format!("calibration of joint {name:?}: {message}"));
     let joints = || mechanisms.iter().flat_map(|mechanism| &mechanism.joints).filter(|j| j.kind != JointKind::Fixed);
@@ -91,6 +92,7 @@ fn calibration(
     if before.iter().any(|other| other.joint == *name) {
         return Err(fail("it has two [[calibration]] entries: keep one".into()));
     }
+    // The numbers; keys left out are zero.
     let three = |key: &str, value: &Option<Spanned<[f64; 3]>>| match value {
         None => Ok([0.0; 3]),
         Some(value) => {

@@ -1,5 +1,8 @@
 //! `[[controller_axis]]` of a robot file: axis conventions of the robot's controller that differ
 //! from the description.
+//!
+//! `joint = zero + sense axis + factor axis_other` (rad or m). Start at [`controller_axes`]. Not
+//! here: their use on a motion (`flexarm-programs`).
 
 use std::ops::Range;
 
@@ -72,18 +75,21 @@ fn axis(
         let known = known_names(name, &names);
         fail(span, format!("the robot has no joint {name:?} that moves independently; it has {known}"))
     };
+    // The joint: independent, and named once.
     if !free(name) {
         return Err(unknown(name, entry.joint.span()));
     }
     if before.iter().any(|axis| axis.joint == *name) {
         return Err(fail(entry.joint.span(), "it has a second entry: keep one of them".into()));
     }
+    // joint = zero + sense axis.
     let sense = match &entry.sense {
         None => 1.0,
         Some(sense) if matches!(*sense.get_ref(), 1 | -1) => *sense.get_ref() as f64,
         Some(sense) => return Err(fail(sense.span(), format!("sense is {}, expected 1 or -1", sense.get_ref()))),
     };
     let zero = zero_of(entry, &fail)?;
+    // An axis measured relative to one that carries it: + factor axis_other.
     let relative = match (&entry.relative_to, &entry.factor) {
         (None, None) => None,
         (None, Some(factor)) => {

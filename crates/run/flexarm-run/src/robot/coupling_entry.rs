@@ -1,8 +1,12 @@
 //! Coupling entry of a robot file: motors that move several joints through their gears.
+//!
+//! `q_joints = C q_motors`, motor angles after their gears (rad or m). The rotors couple the joints:
+//! `C⁻ᵀ diag(armature) C⁻¹`, whose diagonal goes to the joints and the rest to pairs of them. Start at
+//! [`coupling`]. Not here: springs behind coupled gears (`flexarm_stepping::GearCoupling`).
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_flexlink::GearStiffness;
-use flexarm_kinematics::RotorCoupling;
+use flexarm_kinematics::{Joint, RotorCoupling};
 use flexarm_settings::known_names;
 use flexarm_stepping::GearCoupling;
 use nalgebra::DMatrix;
@@ -33,6 +37,7 @@ pub(crate) fn coupling(
     source: &Source,
 ) -> Result<RobotCoupling, RobotFileError> {
     let fail = |span: std::ops::Range<usize>, message: String| Err(source.error(span, format!("coupling: {message}")));
+    // Names: two or more joints with one coordinate and a motor each.
     let joints = entry.joints.get_ref();
     let n = joints.len();
     if n < 2 {
@@ -42,8 +47,8 @@ pub(crate) fn coupling(
         );
     }
     for (k, name) in joints.iter().enumerate() {
-        let single = |j: &&flexarm_kinematics::Joint| j.kind.turns() || j.kind.slides();
-        match robot.rigid.joints.iter().filter(single).find(|j| j.name == *name) {
+        let single = |j: &&Joint| j.kind.turns() || j.kind.slides();
+        match robot.rigid.joint(name).filter(single) {
             None => {
                 let known: Vec<_> = robot.rigid.joints.iter().filter(single).map(|j| j.name.as_str()).collect();
                 let known = known_names(name, &known);
@@ -61,6 +66,7 @@ pub(crate) fn coupling(
             Some(_) => {}
         }
     }
+    // Matrix: square, finite, invertible.
     let rows = entry.matrix.get_ref();
     if rows.len() != n || rows.iter().any(|row| row.len() != n) {
         let widths: Vec<usize> = rows.iter().map(Vec::len).collect();
@@ -79,7 +85,7 @@ pub(crate) fn coupling(
         return fail(entry.matrix.span(), "matrix cannot be inverted: some motion of the joints has no motor".into());
     };
     if let Err(error) = gears_fit(robot, joints) {
-        return fail(entry.joints.span(), error.to_string());
+        return fail(entry.joints.span(), error);
     }
     couple_rotors(robot, joints, &C_inverse);
     Ok(RobotCoupling { joints: joints.clone(), C, C_inverse })
@@ -103,6 +109,7 @@ fn couple_rotors(robot: &mut Robot, joints: &[String], C_inverse: &DMatrix<f64>)
 fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
     let drives: Vec<Option<&Drive>> =
         joints.iter().map(|name| robot.drives.iter().find(|d| d.joint == *name)).collect();
+    // Springs on all joints or on none.
     let yields = |drive: &Option<&Drive>| drive.is_some_and(|d| d.gearbox.is_some());
     let kinds: Vec<_> = drives.iter().map(|d| d.map(|d| d.kind)).collect();
     if drives.iter().any(yields) && (!drives.iter().all(yields) || kinds.windows(2).any(|pair| pair[0] != pair[1])) {
@@ -110,22 +117,15 @@ fn gears_fit(robot: &Robot, joints: &[String]) -> Result<(), String> {
                     rigid gear among elastic ones leaves no springs on the joints"
             .into());
     }
+    // Linear springs about the axes, without laws that depend on one motor.
     for drive in drives.iter().flatten() {
-        let joint = || drive.joint.clone();
         let Some((gearbox, gear)) = &drive.gearbox else { continue };
+        let fail = |what: &str| Err(format!("the gearbox of joint {:?} {what}", drive.joint));
         if !matches!(gearbox.stiffness, GearStiffness::Axis(_)) || !gear.curves.is_empty() {
-            return Err(format!(
-                "the gearbox of joint {joint:?} needs one stiffness, without backlash and curve",
-                joint = joint()
-            ));
+            return fail("needs one stiffness, without backlash and curve");
         }
         if gear.hysteresis.is_some() || !gear.transmission.is_empty() {
-            let message = format!(
-                "the gearbox of joint {joint:?} has a transmission error or hysteresis, which coupled gears do not \
-                 support",
-                joint = joint()
-            );
-            return Err(message);
+            return fail("has a transmission error or hysteresis, which coupled gears do not support");
         }
     }
     match drives.iter().flatten().find(|d| d.load_friction > 0.0) {

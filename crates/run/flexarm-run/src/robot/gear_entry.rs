@@ -1,5 +1,9 @@
 //! Gear entries of a robot file beyond stiffness: transmission error and hysteresis, and the gear
 //! effects of a robot.
+//!
+//! Catalogue terms become laws on the joint's side (rad, N m). Start at [`harmonics`] and
+//! [`hysteresis`]. Not here: stiffness, play and damping (`gearbox_entry`), the torque of the laws
+//! (`flexarm_stepping::Hysteresis`).
 
 use flexarm_stepping::{
     GearCoupling, Harmonic, Hysteresis, LoadFriction, Plant, StepError, TorqueCurve, TransmissionError,
@@ -137,6 +141,7 @@ pub(crate) fn hysteresis(
     let loss = loss.ok_or("hysteresis needs loss (rad) or loss_arcmin: the width of its loop without torque")?;
     let lost_motion =
         one_of([("lost_motion", entry.lost_motion), ("lost_motion_arcmin", entry.lost_motion_arcmin)], ARCMIN)?;
+    // Elastic part: the curve or the stiffness, or softer around zero for a given lost motion.
     let elastic = match (curve, lost_motion, entry.rated_torque) {
         (Some(_), Some(_), _) => {
             return Err("hysteresis with lost_motion takes a stiffness: backlash and a curve say the same".into());
@@ -169,6 +174,7 @@ pub(crate) fn hysteresis(
         (Some(curve), None, _) => curve.clone(),
         (None, None, _) => TorqueCurve::straight(stiffness),
     };
+    // Friction of all sliders together, and how it grows with the deflection of first loading.
     let friction = elastic.torque(0.5 * loss);
     if friction <= 0.0 {
         return Err(format!(

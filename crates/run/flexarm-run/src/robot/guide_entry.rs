@@ -1,5 +1,9 @@
 //! Guide of a telescopic joint in a robot file (`docs/mounting.md`): from the text to checked values
 //! and to the law of each axis.
+//!
+//! The compliance of a tilt is `c0 + c1/l + c2/l²` (rad/(N m)) with the overlap l of the tubes (m),
+//! `l = outer_end - inner_end - q` at the joint position q. Not here: the joints of the tilt in the
+//! tree (`flexarm_flexlink::GuideTubes`), the moment of its play (`flexarm_stepping::Guide`).
 
 use flexarm_flexlink::GuideTubes;
 use flexarm_kinematics::{Body, Joint, JointKind, Limits};
@@ -64,11 +68,12 @@ impl GuideEntry {
     /// Checks the entry for a joint; returns its tubes and the tilts about their axes.
     ///
     /// # Errors
-    /// A sentence with the remedy with the key, the number found and the remedy.
+    /// A sentence with the key, the number found and the remedy.
     pub(crate) fn checked(&self, joint: &Joint) -> Result<(GuideTubes, Vec<GuideTilt>), String> {
         if !matches!(joint.kind, JointKind::Prismatic(_)) {
             return Err("guide is for a prismatic joint, whose tubes slide in each other".into());
         }
+        // The tubes must overlap at both limits of the joint.
         let entries = [('x', &self.x), ('y', &self.y), ('z', &self.z)];
         let tubes = GuideTubes {
             outer_end: self.outer_end,
@@ -82,6 +87,7 @@ impl GuideEntry {
                  within the limits of the joint: overlap = outer_end - inner_end - position"
             ));
         }
+        // Each axis that tilts: a clearance, and a compliance that is positive at every overlap.
         let mut tilts = Vec::new();
         for (axis, entry) in entries {
             let Some(TiltEntry { compliance, play }) = entry else { continue };
@@ -118,7 +124,8 @@ fn overlaps(tubes: &GuideTubes, limits: &Limits) -> Vec<(f64, f64)> {
     positions.into_iter().map(|q| (q, tubes.overlap(q))).collect()
 }
 
-/// Returns the overlap with the smallest compliance, and that compliance.
+/// Returns the overlap with the smallest compliance, and that compliance: at a limit of the joint, or
+/// at `l = -2 c2/c1`, where the derivative by l is zero.
 fn least_compliance(compliance: &[f64; 3], overlaps: &[(f64, f64)]) -> Option<(f64, f64)> {
     let [_, c1, c2] = *compliance;
     let law = Guide { coordinate: 0, overlap: [0.0; 2], compliance: *compliance, play: None };

@@ -29,6 +29,7 @@ pub(super) fn weigh(
     mechanisms: &mut [&mut Mechanism],
     source: &Source,
 ) -> Result<(), RobotFileError> {
+    // The link: in the URDF, named once, and rigid.
     let name = entry.link.get_ref();
     let fail = |message: String| source.error(entry.link.span(), format!("inertial of link {name:?}: {message}"));
     if mechanisms.iter().all(|mechanism| mechanism.link(name).is_none()) {
@@ -42,6 +43,7 @@ pub(super) fn weigh(
         let message = "the link is flexible: give `mass` of its [[flexible_link]] (beams), or its parts (.flex)";
         return Err(fail(message.into()));
     }
+    // The numbers.
     if let Some(com) = &entry.com {
         check_finite("inertial com", com.get_ref(), com.span(), source)?;
     }
@@ -49,6 +51,7 @@ pub(super) fn weigh(
         let message = format!("inertial mass = {}: expected a positive number of kg", mass.get_ref());
         return Err(source.error(mass.span(), message));
     }
+    // A new mass scales the inertia, so that radii of gyration stay.
     let links = mechanisms.iter_mut().flat_map(|mechanism| &mut mechanism.links).filter(|link| link.name == *name);
     for link in links {
         let Some(inertia) = link.inertia.as_mut().filter(|inertia| inertia.mass > 0.0) else {

@@ -267,6 +267,7 @@ fn stress_source(
     if asked.is_some_and(|asked| !asked.get_ref()) {
         return Ok(None);
     }
+    // A beam only has stress if the entry asks for it.
     let Some(reduced) = &entry.reduced else {
         let Some(beam) = entry.beam.as_ref().filter(|_| asked.is_some()) else { return Ok(None) };
         if beam.get_ref().section == GIVEN {
@@ -277,6 +278,7 @@ fn stress_source(
         }
         return Ok(Some(StressSource::Beam));
     };
+    // A reduced link has stress if its file is there.
     let file = home.folder.join(reduced.get_ref()).with_extension(STRESS_FILE);
     if file.is_file() {
         let fields = home.files.stress(&file).map_err(|error| fail(format!("stress of link {name:?}: {error}")))?;

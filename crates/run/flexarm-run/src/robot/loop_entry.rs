@@ -1,4 +1,4 @@
-//! Closed loop entries of a robot file: from the text to a checked tree.
+//! Closed loop entries of a robot file: from the text to a checked tree. Points are in link axes (m).
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -37,6 +37,7 @@ pub(crate) fn add_loops(robot: &mut Robot, entries: &[Spanned<LoopEntry>], sourc
     let before = faults.len();
     let mut places: Vec<(String, Range<usize>)> = Vec::new();
     for (number, entry) in entries.iter().enumerate() {
+        // Each entry on its own.
         let LoopEntry { name, pin, axis, eye, dependent, at } = entry.get_ref();
         let place = name.as_ref().map_or(dependent.span(), Spanned::span);
         let name = name.as_ref().map_or_else(|| format!("loop_{}", number + 1), |name| name.get_ref().clone());

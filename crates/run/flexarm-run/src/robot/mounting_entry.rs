@@ -162,6 +162,7 @@ fn riding_mass(
     entry: &Spanned<MountingEntry>,
     source: &Source,
 ) -> Result<Option<LinkInertia>, Error> {
+    // Without a mass of its own the springs carry the base, which must then have one.
     let Some(mass) = &given.mass else {
         if given.com.is_some() || given.inertia.is_some() {
             return Err(source
@@ -178,6 +179,7 @@ fn riding_mass(
         }
         return Ok(None);
     };
+    // A given mass, with its inertia about its centre; none is no body at all.
     let (kg, com) = (*mass.get_ref(), given.com.unwrap_or_default());
     if !(kg.is_finite() && kg >= 0.0) {
         return Err(source.error(mass.span(), format!("mounting mass is {kg} kg, it must be 0 or positive")).into());

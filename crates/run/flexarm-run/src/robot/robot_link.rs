@@ -1,4 +1,8 @@
 //! A flexible link of a robot with the data from which its models are built.
+//!
+//! Start at [`RobotLink::form`]: two rigid parts, a chain of more, or modes, as the robot file or an
+//! override asks, made of the beam or taken from the `.flex` file. Not here: reading the entry
+//! (`link_entry`), the tree with the link in it (`flexarm-flexlink`).
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -88,7 +92,12 @@ pub(crate) enum RequestedKey {
 }
 
 impl RobotLink {
-    /// Applies the stiffness factors to a spring of the lumped models.
+    /// Returns the stiffness of a spring of the lumped models, given that of its source: replaced if
+    /// the robot file has one, and with all factors.
+    ///
+    /// ```text
+    /// K = f S K_S S,    S = diag(√f_1, ..., √f_6)
+    /// ```
     pub(crate) fn scaled(&self, K: &Matrix6<f64>) -> Matrix6<f64> {
         let root = self.stiffness_factors.map(f64::sqrt);
         let K = self.stiffness.as_ref().unwrap_or(K);
@@ -111,6 +120,7 @@ impl RobotLink {
 
     /// As [`Self::form`], with the robot file key that requested what is missing.
     pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, String)> {
+        // What only one of the models has is an error with the other.
         let link = &self.flexible.link;
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {
@@ -145,6 +155,7 @@ impl RobotLink {
 
     fn lumped(&self, segments: usize) -> Result<LinkForm, String> {
         let link = &self.flexible.link;
+        // Bound on the work of a step.
         let coordinates = 6 * segments.saturating_sub(1);
         if coordinates > MAX_COORDINATES {
             let message = format!(
@@ -156,6 +167,7 @@ impl RobotLink {
             );
             return Err(message);
         }
+        // A beam can be cut into any number of parts, a mesh into those stored.
         if let Some(beam) = &self.beam {
             let chain = beam.chain(segments).map(LinkForm::Chain);
             return chain.map_err(|source| format!("link {link:?}: {source}"));
@@ -181,6 +193,7 @@ impl RobotLink {
         let name = &self.flexible.link;
         let fail =
             |asked: RequestedKey| move |source: FemError| (asked, format!("link {name:?} cannot be modal: {source}"));
+        // Number of modes: override, robot file, or what the source has.
         let wanted = modelling.modes.or(self.choices.modes);
         if let Some(modes) = wanted.filter(|modes| *modes > MAX_MODES) {
             let error = format!(
@@ -190,6 +203,7 @@ impl RobotLink {
             );
             return Err((RequestedKey::Modes, error));
         }
+        // Modes of the beam, or those stored; a file with matrices alone is condensed to modes.
         let full = match &self.beam {
             Some(beam) => {
                 let modes = wanted.unwrap_or(BEAM_MODES);
@@ -221,6 +235,7 @@ impl RobotLink {
                 }
             }
         };
+        // Geometric stiffening and eigenmodes, if the robot file asks for them.
         if self.choices.geometric && full.geometric.is_none() {
             let message = format!(
                 "link {name:?}: geometric_stiffening needs a beam, or a .flex file made with flexarm reduce {}",

@@ -1,4 +1,7 @@
-//! Strengths of materials, against which the stress of links is judged.
+//! Strengths of materials, against which the stress of links is judged (Pa).
+//!
+//! Start at [`Strength`]: those of the preset materials, or the entry of a robot file. Not here: the
+//! stress (`run::monitor::stress`), the count of its cycles (`flexarm_analysis::SnCurve`).
 
 use flexarm_analysis::SnCurve;
 use flexarm_fem::Material;
@@ -33,7 +36,7 @@ pub struct Strength {
 }
 
 impl Strength {
-    /// S-N curve of parts that are not welded: knee at 1e6 cycles, slope 5 (FKM guideline, 6th
+    /// Returns the S-N curve of parts that are not welded: knee at 1e6 cycles, slope 5 (FKM guideline, 6th
     /// edition, 4.4.3), for a probability of survival of 97.5 %, without surface and size effects.
     pub(crate) fn curve(&self) -> Option<SnCurve> {
         let (amplitude_pa, tensile_pa) = (self.fatigue_pa?, self.tensile_pa);

@@ -3,6 +3,8 @@
 //! Links are bodies, elastic coordinates slides and hinges. MuJoCo has no prescribed motion: motors
 //! that follow the trajectory exactly get a rotor so heavy that the arm does not disturb it, and
 //! three actuators, for acceleration, position and speed. Joints driven by torque get a motor.
+//!
+//! Not here: the split of coupled springs (`springs.rs`), bodies and joints (`parts.rs`).
 
 use std::fmt::Write as _;
 
@@ -23,6 +25,7 @@ const RETURN: f64 = 200.0;
 pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part], springs: &Springs, step_s: f64) -> String {
     let model = &posed.plant.model;
     let mut out = String::new();
+    // Springs over one joint are its own; those over several become tendons.
     let meshes = parts.iter().flat_map(|part| &part.shapes);
     let assets: String = meshes
         .map(|shape| format!("    <mesh name=\"{0}\" file=\"{0}.stl\" inertia=\"shell\"/>\n", shape.name))
@@ -39,6 +42,7 @@ pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part], springs: &Sprin
         numbers(model.gravity.as_slice())
     );
     writer.body(&mut out, 0, 2);
+    // After the bodies: what couples their joints, what drives them, and the pose at rest.
     out += "  </worldbody>\n";
     out += &section("tendon", several.iter().map(|spring| tendon(spring, &axes, model.n_actuated())));
     let following = axes.iter().filter_map(|axis| {
@@ -68,6 +72,7 @@ impl Writer<'_> {
     /// Writes what is in a body: joints, inertia, shapes, the tool, and its children.
     fn body(&self, out: &mut String, index: usize, depth: usize) {
         let (part, pad) = (&self.parts[index], "  ".repeat(depth));
+        // Joints to the parent, then the body's own mass; the world has none.
         for axis in &part.joints {
             *out += &format!("{pad}{}\n", self.joint(axis));
         }
@@ -81,6 +86,7 @@ impl Writer<'_> {
                 numbers(&full)
             );
         }
+        // Shapes are seen only: no mass, no contact.
         for shape in &part.shapes {
             let color = shape.color.map(f64::from);
             *out += &format!(
@@ -114,6 +120,7 @@ impl Writer<'_> {
         if axis.anchor.norm() > 0.0 {
             let _ = write!(text, " pos=\"{}\"", numbers(axis.anchor.as_slice()));
         }
+        // A spring on factor × coordinate has factor² of its stiffness on the coordinate.
         for spring in self.single.iter().filter(|spring| n + spring.terms[0].0 == k) {
             let factor = spring.terms[0].1.powi(2);
             for (name, value) in [("stiffness", spring.stiffness * factor), ("damping", spring.damping * factor)] {
@@ -122,6 +129,7 @@ impl Writer<'_> {
                 }
             }
         }
+        // Motors have limits and a rotor; elastic coordinates have neither.
         if k < n {
             let limits = &model.coordinates()[k].limits;
             if limits.lower.is_finite() && limits.upper.is_finite() && axis.follows.is_none() {

@@ -1,4 +1,9 @@
 //! The tree of an arm as bodies with one-coordinate joints.
+//!
+//! An elastic joint of six coordinates becomes three slides and three hinges in Z-Y-X order, exact for
+//! those angles and to first order for rotation vectors. B is a body, P its parent, V a mesh; axes,
+//! anchors and inertias are in body axes (m, kg m²). Start at [`parts`]. Not here: the text of the
+//! formats (`mjcf.rs`, `urdf.rs`), the springs over the joints (`springs.rs`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,7 @@
 //! URDF with a joint for each elastic coordinate, between links without mass.
+//!
+//! SI units; inertias about centres of mass, in link axes. Not here: springs and dampers, which URDF
+//! does not have (`springs.json`, see `springs.rs`).
 
 use std::fmt::Write as _;
 
@@ -15,10 +18,12 @@ pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part]) -> String {
     for part in parts {
         link(&mut out, part);
     }
+    // Joints that follow another one name the first joint of its coordinate.
     let driver = |axis: &Axis| {
         let joints = parts.iter().flat_map(|part| &part.joints);
         joints.filter(|other| other.coordinate == axis.coordinate).find(|other| other.follows.is_none())
     };
+    // A chain of joints per part; links without mass between them.
     for part in &parts[1..] {
         let mut parent = parts[part.parent].name.clone();
         for (k, axis) in part.joints.iter().enumerate() {

@@ -192,6 +192,7 @@ impl Arm {
         options: &RunOptions,
         own: &LiveOptions,
     ) -> Result<Live, Error> {
+        // Options that fit: open servos need motors, the period a whole number of fixed steps.
         let servos = own.servos;
         if servos == Servos::Open && !self.has_servo() {
             return Err(Error::Value(
@@ -210,6 +211,8 @@ impl Arm {
             )));
         }
         whole_steps(period_s, step_s)?;
+
+        // The arm at rest at its targets, and its first readings.
         let targets = Arc::new(Targets(RwLock::new(Period::at_rest(&at, period_s))));
         let Commanded { arm, plants, push, readings } = Commanded::new(self, own, targets.clone())?;
         let (has_payload, options) = (own.payload, options.clone());

@@ -1,4 +1,7 @@
 //! Readings of an arm that is commanded: joints, TCP, gauges.
+//!
+//! World axes; TCP velocities at the TCP, linear first. Not here: the state and its steps
+//! (`live/mod.rs`), the columns of a run (`run/sampler.rs`).
 
 use std::sync::Arc;
 
