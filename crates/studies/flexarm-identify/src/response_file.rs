@@ -147,6 +147,7 @@ impl Reader<'_> {
                 return Err(self.error(at, format!("form = {other:?} is not known; use \"log\" or \"complex\"")));
             }
         };
+        // All curves of the file at one pose, each with its points and nodes.
         let (q, load) = (self.joints(&e.joints)?, self.load(&e.load, &site)?);
         let own = self.std(located(&e.std), 1.0)?;
         for curve in curves {
@@ -209,6 +210,7 @@ impl Reader<'_> {
             let text = format!("column {stray:?} is not known; expected hz, re and im or magnitude and phase, and std");
             return Err(table.error(None, text).into());
         }
+        // Columns, and the unit of the values.
         let column = |name: &str| table.column(name);
         let hz = column("hz").ok_or_else(|| table.error(None, "there is no column hz"))?;
         let pair = match (column("re"), column("im"), column("magnitude"), column("phase")) {
@@ -234,6 +236,7 @@ impl Reader<'_> {
             let value = if pair.2 { Complex::from_polar(a, b * self.units.angle) } else { Complex::new(a, b) };
             values.push((f, value * factor, std));
         }
+        // A table names one pair of points.
         let of = |node: &Option<Spanned<String>>, direction: &Option<Spanned<Direction>>, what: &str| {
             let Some(direction) = direction else {
                 return Err(self.error(&e.file, format!("a table needs a direction, such as {what}_direction = \"x\"")));
@@ -262,6 +265,7 @@ impl Reader<'_> {
         if let Some(node) = given {
             return Err(self.error(node, "a universal file contains nodes and directions: remove them here"));
         }
+        // Each function names its pair of points by node numbers.
         let functions = read_functions(path, &bytes)?;
         let one = |function: &UffFunction| {
             let name = Place::of_file(e.file.get_ref().display()).line(function.line).to_string();
@@ -339,6 +343,7 @@ impl Reader<'_> {
         q: &[f64],
         site: &Site<'_>,
     ) -> Result<Probe, Error> {
+        // Point: the tool, or a node on a link.
         let arm = self.cell.arm;
         let tool = || arm.tcp.clone();
         let Some(name) = name else { return Ok(Probe { frame: tool(), direction: *direction }) };
@@ -356,6 +361,7 @@ impl Reader<'_> {
         }
         let at = Translation3::from(Vector3::from(*xyz) * self.units.length);
         let frame = Frame { X_BF: frame.X_BF * Pose::from_parts(at, Rotation3::identity()), ..frame };
+        // Direction: in world axes, or in those of the frame at the pose.
         let direction = match axes.as_ref().map(|word| (word.get_ref().as_str(), word)) {
             None | Some(("world", _)) => *direction,
             Some(("frame", _)) => {

@@ -18,6 +18,7 @@ mod parameters;
 mod placement;
 mod recorded_encoders;
 mod response;
+mod places;
 mod rewrite;
 mod scatter;
 mod sensitivities;

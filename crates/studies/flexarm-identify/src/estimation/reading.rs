@@ -28,12 +28,6 @@ impl LoadCase {
     }
 }
 
-impl Default for LoadCase {
-    fn default() -> Self {
-        Self::none()
-    }
-}
-
 /// One measured number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row<T> {
