@@ -1,4 +1,6 @@
 //! Lists of poses read from a file.
+//!
+//! Start at [`read_poses`]. A table names its columns after joints, a TOML file lists values.
 
 use std::path::Path;
 
