@@ -1,5 +1,8 @@
 //! File of a cutting tool (`docs/lobes.md`): cutter, engagement, spindle speeds, position of the
 //! tip, flexibility. Units are converted here.
+//!
+//! Start at [`CuttingTool::load`]. Directions stay in the axes in which the file gives them
+//! ([`Direction`]). Not here: plausible ranges, which are caveats ([`super::caveats`]).
 
 use std::ops::Range;
 use std::path::Path;
@@ -217,6 +220,7 @@ impl CuttingTool {
     }
 }
 
+/// Returns the factor of a unit to SI units; the first one by default.
 fn unit(
     key: &str,
     given: &Option<Spanned<String>>,
@@ -239,6 +243,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// Returns the tool.
     fn tool(&self, file: &ToolFile, name: String) -> Result<CuttingTool, Error> {
         let cutter = self.cutter(&file.cutter, &file.engagement)?;
         let deepest = match &file.deepest {
@@ -265,6 +270,7 @@ impl Reader<'_> {
         })
     }
 
+    /// Reads teeth, angles and coefficients; a mistaken unit of the coefficients is refused.
     fn cutter(&self, entry: &Spanned<CutterEntry>, engagement: &Spanned<EngagementEntry>) -> Result<Cutter, Error> {
         let e = entry.get_ref();
         let teeth = match *e.teeth.get_ref() {
@@ -282,6 +288,7 @@ impl Reader<'_> {
                 format!("{what} is {:.2} degrees, expected {low} to {:.0}", found.to_degrees(), high.to_degrees());
             Err(self.error(value.span(), message))
         };
+        // Coefficients in N/m², then the cutter as a whole.
         let k = e.coefficients.get_ref();
         let coefficients = Coefficients {
             tangential: k.tangential * self.pressure,
@@ -311,6 +318,7 @@ impl Reader<'_> {
         Ok(cutter)
     }
 
+    /// Reads the range of angles in which a tooth cuts; each kind has its own keys.
     fn engagement(&self, entry: &Spanned<EngagementEntry>, diameter: f64) -> Result<Engagement, Error> {
         let e = entry.get_ref();
         let kind = e.kind.get_ref().as_str();
@@ -343,6 +351,7 @@ impl Reader<'_> {
         }
     }
 
+    /// Returns the radial depth of cut over the diameter.
     fn immersion(&self, e: &EngagementEntry, place: Range<usize>, diameter: f64) -> Result<f64, Error> {
         let (part, span) = match (&e.ae, &e.immersion) {
             (Some(ae), None) => (self.length * *ae.get_ref() / diameter, ae.span()),
@@ -358,6 +367,7 @@ impl Reader<'_> {
         Err(self.error(span, format!("the radial depth is {part:.4} diameters, expected above 0, at most 1")))
     }
 
+    /// Reads entry and exit angle.
     fn angles(&self, e: &EngagementEntry, place: Range<usize>) -> Result<Engagement, Error> {
         let (Some(from), Some(to)) = (&e.entry, &e.exit) else {
             return Err(self.error(place, "kind = \"angles\" needs entry = ... and exit = ..."));
@@ -377,8 +387,10 @@ impl Reader<'_> {
         Ok(Engagement { entry, exit: exit.min(entry + turn) })
     }
 
+    /// Reads the spindle speeds (1/min): a list, or a range.
     fn speeds(&self, entry: &Spanned<SpindleEntry>) -> Result<Vec<f64>, Error> {
         let e = entry.get_ref();
+        // Either the speeds themselves, or a range with a number of equal steps.
         match (&e.rpm, &e.from, &e.to) {
             (Some(list), None, None) if e.points.is_none() => {
                 let rpm = list.get_ref();
@@ -436,6 +448,7 @@ impl Reader<'_> {
         }
     }
 
+    /// Reads a mode of the tool; modal mass or stiffness follows from the other and the frequency.
     fn mode(&self, entry: &Spanned<ModeEntry>) -> Result<ToolMode, Error> {
         let e = entry.get_ref();
         let direction = match e.direction.get_ref() {
@@ -451,6 +464,7 @@ impl Reader<'_> {
                 ToolDirection::Along(self.unit_vector("direction", *vector, e.direction.span())?)
             }
         };
+        // m = k / ω²; both must be those of a tool or a spindle.
         let omega = std::f64::consts::TAU * self.positive("frequency", &e.frequency, 1.0, Quantity::FREQUENCY)?;
         let mass = match (&e.mass, &e.stiffness) {
             (Some(mass), None) => {
@@ -490,10 +504,12 @@ impl Reader<'_> {
         self.located(value.span(), Quantity::LENGTH.check_all(what, &point)).map(|()| point)
     }
 
+    /// Adds the place to a number out of range.
     fn located<T>(&self, span: Range<usize>, checked: Result<T, OutOfRange>) -> Result<T, Error> {
         checked.map_err(|outside| self.error(span, outside.to_string()))
     }
 
+    /// Returns a direction of length 1.
     fn unit_vector(&self, what: &str, value: [f64; 3], span: Range<usize>) -> Result<Vector3<f64>, Error> {
         let vector = Vector3::from(value);
         let size = vector.norm();
