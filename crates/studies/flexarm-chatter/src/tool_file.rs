@@ -15,7 +15,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use flexarm_run::robot_file::Source;
-use flexarm_run::toml_file::parsed;
+use flexarm_run::toml_file::{parsed, word};
 use flexarm_run::{Error, RobotFileError};
 
 /// Contents of the file as written.
@@ -197,9 +197,9 @@ impl CuttingTool {
         let file: ToolFile = parsed(&text, &source, &[], |file: &ToolFile| &file.format)?;
         let reader = Reader {
             source: &source,
-            length: unit("lengths", &file.lengths, &LENGTHS, &source)?,
-            angle: unit("angles", &file.angles, &ANGLES, &source)?,
-            pressure: unit("pressures", &file.pressures, &PRESSURES, &source)?,
+            length: word(&source, "lengths", &file.lengths, &LENGTHS)?.1,
+            angle: word(&source, "angles", &file.angles, &ANGLES)?.1,
+            pressure: word(&source, "pressures", &file.pressures, &PRESSURES)?.1,
         };
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         reader.tool(&file, name)
@@ -218,20 +218,6 @@ impl CuttingTool {
         self.rpm = rpm;
         self
     }
-}
-
-/// Returns the factor of a unit to SI units; the first one by default.
-fn unit(
-    key: &str,
-    given: &Option<Spanned<String>>,
-    known: &[(&'static str, f64)],
-    source: &Source,
-) -> Result<f64, RobotFileError> {
-    let Some(word) = given else { return Ok(known[0].1) };
-    known.iter().find(|(name, _)| name == word.get_ref()).map(|found| found.1).ok_or_else(|| {
-        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-        source.error(word.span(), format!("{key} = {:?} is not known; use one of {names:?}", word.get_ref()))
-    })
 }
 
 /// Data for reading entries.
@@ -429,13 +415,7 @@ impl Reader<'_> {
         value: &Option<Spanned<[f64; 3]>>,
         axes: &Option<Spanned<String>>,
     ) -> Result<Option<Direction>, Error> {
-        let world = match axes.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
-            None | Some(("tcp", _)) => false,
-            Some(("world", _)) => true,
-            Some((other, span)) => {
-                return Err(self.error(span, format!("{its_axes} = {other:?} is not known; use \"tcp\" or \"world\"")));
-            }
-        };
+        let world = word(self.source, its_axes, axes, &[("tcp", false), ("world", true)])?.1;
         match (value, axes) {
             (Some(value), _) => {
                 let direction = self.unit_vector(what, *value.get_ref(), value.span())?;

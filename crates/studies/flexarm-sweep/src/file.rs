@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use flexarm_files::{NumberTable, read_text};
 use flexarm_run::robot_file::Source;
-use flexarm_run::toml_file::parsed;
+use flexarm_run::toml_file::{parsed, word};
 use flexarm_run::{Error, RobotFileError};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
@@ -297,14 +297,8 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
         )));
     }
     // What the values do to those in the files, and which values there are.
-    let role = match own.role.as_ref().map(|role| role.get_ref().as_str()) {
-        None | Some("value") => Role::Value,
-        Some("factor") => Role::Factor,
-        Some("offset") => Role::Offset,
-        Some(other) => {
-            return Err(fail(format!("as = {other:?} is not known; use \"value\", \"factor\" or \"offset\"")));
-        }
-    };
+    let roles = [("value", Role::Value), ("factor", Role::Factor), ("offset", Role::Offset)];
+    let role = word(source, "as", &own.role, &roles)?.1;
     let values = values(own, source, &fail)?;
     let place = source.error(entry.span(), "");
     if own.each && own.name.is_some() {
@@ -369,11 +363,7 @@ fn range(
     let (Some(from), Some(to)) = (own.from, own.to) else {
         return Err(fail("a range needs from = ... and to = ...".into()));
     };
-    let logarithmic = match own.spacing.as_ref().map(|word| word.get_ref().as_str()) {
-        None | Some("linear") => false,
-        Some("log") => true,
-        Some(other) => return Err(fail(format!("spacing = {other:?} is not known; use \"linear\" or \"log\""))),
-    };
+    let logarithmic = word(source, "spacing", &own.spacing, &[("linear", false), ("log", true)])?.1;
     if !(from.is_finite() && to.is_finite()) || logarithmic && !(from > 0.0 && to > 0.0) {
         let expected = if logarithmic { "positive numbers for spacing = \"log\"" } else { "finite numbers" };
         return Err(fail(format!("from = {from}, to = {to}: expected {expected}")));

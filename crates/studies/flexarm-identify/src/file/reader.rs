@@ -59,7 +59,7 @@ impl<'a> From<&Site<'a>> for Site<'a> {
 /// State of the reader.
 pub(crate) struct Reader<'a> {
     pub(crate) cell: &'a Cell<'a>,
-    pub(super) source: &'a Source,
+    pub(crate) source: &'a Source,
     pub(crate) folder: &'a Path,
     pub(crate) units: Units,
     pub(super) targets: Vec<String>,
