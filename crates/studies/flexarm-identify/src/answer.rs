@@ -12,11 +12,10 @@ use serde::Serialize;
 
 use super::caveats::{caveats, combinations};
 use super::encoders::EncoderFigures;
-use super::error::refused;
 use super::file::MeasurementInput;
 use crate::estimation::{
-    FittedParameter, Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, NominalArm, Parameter,
-    Reading, ReadingKind, Target,
+    FittedParameter, Form, Identified, IdentifyError, Instrument, MeasuredArm, Measurements, ModelError, NominalArm,
+    Parameter, Reading, ReadingKind, Target,
 };
 
 /// Maximum number of suspicious readings in the result.
@@ -398,7 +397,7 @@ fn shapes(
     unknowns: &DVector<f64>,
 ) -> Result<Vec<ShapeFigures>, Error> {
     let arm = MeasuredArm { nominal, parameters: fitted, measurements };
-    let of = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(|error| refused(error.to_string()));
+    let of = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(IdentifyError::from);
     let (before, after) = (of(&DVector::zeros(unknowns.len()))?, of(unknowns)?);
     let figures = before.iter().zip(after).map(|((_, _, before), (number, mode, assurance))| ShapeFigures {
         reading: measurements.readings[number].name.clone(),
