@@ -1,4 +1,7 @@
 //! Caveats about cutting tools: plausible ranges of diameter, frequency, stiffness and damping.
+//!
+//! Start at [`tool_caveats`] and [`feed_caveat`]. Not here: values that are refused
+//! ([`super::tool_file`]).
 
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
@@ -99,6 +102,7 @@ const TOO_DAMPED: &[Factor] = &[(100.0, "per cent")];
 ///
 /// * `deepest_m`: maximum depth of the search (m).
 pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
+    // The cutter: sizes, engagement, coefficients, angles.
     let name = format!("the tool {:?}", tool.name);
     let of = |what: &str| format!("{what} of {name}");
     let cutter = &tool.cutter;
@@ -136,6 +140,7 @@ pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
     if cutter.helix != 0.0 {
         found.extend(outside(&angle, of("the helix"), cutter.helix.to_degrees(), &CUTTING_ANGLE, radians, 1.0));
     }
+    // Each mode.
     let masses = MIN_MASS * STEEL * cutter.diameter.powi(3)..=MAX_MASS;
     for (k, mode) in tool.modes.iter().enumerate() {
         let whose = format!("mode {} of {name}", k + 1);
@@ -148,7 +153,7 @@ pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
     found
 }
 
-/// Number of instants of a motion at which the feed is looked at.
+/// Number of instants of a motion at which the feed is sampled.
 const INSTANTS: usize = 101;
 
 /// Returns a caveat if a tool advances too far from one tooth to the next, at its highest spindle
@@ -157,6 +162,7 @@ const INSTANTS: usize = 101;
 /// # Errors
 /// [`Error`] if the motion is not one of the robot.
 pub fn feed_caveat(robot: &Robot, tool: &CuttingTool, motion: &Motion) -> Result<Option<Finding>, Error> {
+    // Median speed while the tool moves, over the teeth per second at the highest spindle speed.
     let speeds = tip_motion(robot, tool, motion, INSTANTS)?.into_iter().map(|at| at.velocity.norm());
     let mut speeds: Vec<f64> = speeds.filter(|speed| *speed > STANDS).collect();
     speeds.sort_by(f64::total_cmp);

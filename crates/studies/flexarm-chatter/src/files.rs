@@ -1,4 +1,6 @@
 //! Output files of `flexarm lobes`: table, diagram, page, figures.
+//!
+//! Start at [`save`]. Depths are shown rounded down, so that a printed limit is stable.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -18,6 +20,7 @@ const WIDE: f64 = 40.0;
 /// Maximum number of poses with a curve each.
 const DRAWN: usize = 8;
 
+/// Writes table, diagram, page and figures, and their names into the result.
 pub(super) fn save(answer: &mut Lobes, tool: &CuttingTool, paths: [PathBuf; 4]) -> Result<(), Error> {
     let text = |k: usize| Some(paths[k].display().to_string());
     let picture = plot(answer, tool).ok();
@@ -42,10 +45,12 @@ pub fn rounded_down(x: f64, digits: usize) -> String {
     }
 }
 
+/// Formats a cell, empty without a value.
 fn cell(x: Option<f64>) -> String {
     x.map_or_else(String::new, |x| x.to_string())
 }
 
+/// Returns the table of the limits.
 fn csv(answer: &Lobes) -> String {
     let mut text = String::from("spindle_rpm,depth_m,chatter_hz,kind,pose\n");
     for p in &answer.points {
@@ -58,8 +63,8 @@ fn csv(answer: &Lobes) -> String {
 
 /// Plots depth and chatter frequency over the spindle speed.
 fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
-    let rpm = |p: &LobePoint| p.spindle_rpm;
-    let x: Vec<f64> = answer.points.iter().map(rpm).collect();
+    // Limits of the poses, and the lowest of them.
+    let x: Vec<f64> = answer.points.iter().map(|p| p.spindle_rpm).collect();
     let limit: Vec<f64> = answer.points.iter().map(|p| p.depth_m.map_or(f64::NAN, |d| 1e3 * d)).collect();
     let mut curves = Vec::new();
     if answer.poses.len() > 1 && answer.poses.len() <= DRAWN {
@@ -72,6 +77,7 @@ fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
     curves.extend(stretches("stability limit", CurveLook::Total, &x, &limit));
     let finite = || limit.iter().copied().filter(|d| d.is_finite());
     let logarithmic = finite().fold(0.0, f64::max) > WIDE * finite().fold(f64::INFINITY, f64::min);
+    // Chatter frequencies by kind.
     let chatter = |kind: &str, name: &str| {
         let of: Vec<&LobePoint> = answer.points.iter().filter(|p| p.kind == Some(kind)).collect();
         PlotCurve {
@@ -121,6 +127,7 @@ fn stretches(name: &str, look: CurveLook, x: &[f64], y: &[f64]) -> Vec<PlotCurve
     curves
 }
 
+/// Returns the lines under the title of the diagram.
 fn notes(answer: &Lobes, tool: &CuttingTool) -> Vec<String> {
     let e = tool.cutter.engagement;
     let cut = format!(
@@ -143,7 +150,9 @@ fn notes(answer: &Lobes, tool: &CuttingTool) -> Vec<String> {
     vec![cut, place, stable]
 }
 
+/// Returns the page, with the diagram if there is one.
 fn html(answer: &Lobes, picture: Option<&str>) -> String {
+    // The answer in a sentence: depths are rounded down, since a limit is never to be exceeded.
     let mut page = opening(&format!("Chatter of {} on {}", answer.tool, answer.robot));
     let _ = match (answer.stable_below_m, answer.stable_below_at_rpm) {
         (Some(depth), Some(rpm)) => writeln!(
@@ -162,18 +171,17 @@ fn html(answer: &Lobes, picture: Option<&str>) -> String {
              <th>spindle speed [1/min]</th><th>compliance along the feed [&micro;m/N]</th>\
              <th>across the feed [&micro;m/N]</th><th>along the tool axis [&micro;m/N]</th>\
              <th>first natural frequencies [Hz]</th></tr>\n";
+    // Table of the poses along the motion.
+    let number = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".into(), |x| format!("{x:.digits$}"));
     for pose in &answer.poses {
-        let number = |x: Option<f64>, scale: f64, digits: usize| {
-            x.map_or_else(|| "-".into(), |x| format!("{:.digits$}", scale * x))
-        };
         let hz: Vec<String> = pose.frequencies_hz.iter().take(3).map(|f| format!("{f:.1}")).collect();
         let [x, y, z] = pose.compliance.map(|c| format!("{:.3}", 1e6 * c));
         let _ = writeln!(
             page,
             "<tr><td>{}</td><td>{}</td><td>{}</td><td>{x}</td><td>{y}</td><td>{z}</td><td>{}</td></tr>",
-            number(pose.time_s, 1.0, 2),
+            number(pose.time_s, 2),
             pose.stable_below_m.map_or_else(|| "-".into(), |depth| rounded_down(1e3 * depth, 3)),
-            number(pose.stable_below_at_rpm, 1.0, 0),
+            number(pose.stable_below_at_rpm, 0),
             hz.join(", ")
         );
     }

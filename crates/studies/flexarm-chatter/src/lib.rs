@@ -25,19 +25,18 @@ pub mod milling;
 mod place;
 mod tool_file;
 
-use flexarm_run::ExternalError;
 use std::f64::consts::TAU;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::milling::{Kind, LimitOptions, limit_of_depth, unstable_ranges};
 use flexarm_files::check_free;
+use flexarm_run::caveat::of_use;
+use flexarm_run::{Error, ExternalError, Finding, Modelling, Motion, Robot, caveat};
 use flexarm_settings::Quantity;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use flexarm_run::caveat::of_use;
-use flexarm_run::{Error, Finding, Modelling, Motion, Robot, caveat};
+use crate::milling::{Kind, LimitOptions, limit_of_depth, unstable_ranges};
 
 pub use crate::milling::ChatterError;
 pub use caveats::{feed_caveat, tool_caveats};
@@ -221,12 +220,14 @@ pub fn lobes(
     request: &LobesRequest,
     go_on: &(dyn Fn(usize, usize) -> bool + Sync),
 ) -> Result<Lobes, Error> {
+    // Numbers and files first: the computation takes long.
     let deepest_m = request.deepest_m.unwrap_or(tool.deepest);
     check_deepest(deepest_m)?;
     check_speeds(&tool.rpm)?;
     let paths = request.output.as_ref().map(|folder| files::NAMES.map(|name| folder.join(name)));
     check_free(paths.as_ref().map_or(&[], |paths| paths.as_slice()), request.overwrite)?;
 
+    // Every speed at every pose, on all cores.
     let (places, left_out) = match place {
         CuttingPlace::At(at) => (vec![CutPose::at(robot, &request.modelling, tool, *at)?], 0),
         CuttingPlace::Along(motion, n) => CutPose::along(robot, &request.modelling, tool, motion, *n)?,
@@ -241,6 +242,7 @@ pub fn lobes(
         point.map_err(|source| LobesError::Chatter { place: at.words(), source }.into())
     };
     let all: Vec<LobePoint> = (0..speeds * places.len()).into_par_iter().map(limit).collect::<Result<_, Error>>()?;
+    // The result with its caveats.
     let mut answer = assembled(robot, tool, &places, &all, deepest_m);
     answer.left_out = left_out;
     if let CuttingPlace::Along(motion, _) = place {
@@ -257,6 +259,9 @@ pub fn lobes(
     Ok(answer)
 }
 
+/// Computes the limit at a pose and a spindle speed (1/min), and all unstable ranges with `ranges`.
+///
+/// * `pose`: index of the pose.
 fn point(
     place: &CutPose,
     tool: &CuttingTool,
@@ -335,7 +340,11 @@ fn lower<'p>(a: &'p LobePoint, b: &'p LobePoint) -> &'p LobePoint {
     if depth(b) < depth(a) { b } else { a }
 }
 
+/// Returns the result without caveats and files.
+///
+/// * `all`: limits, speed after speed for each pose.
 fn assembled(robot: &Robot, tool: &CuttingTool, places: &[CutPose], all: &[LobePoint], deepest_m: f64) -> Lobes {
+    // Per pose the lowest limit of all speeds.
     let speeds = tool.rpm.len();
     let of_pose = |k: usize| &all[k * speeds..(k + 1) * speeds];
     let lowest = |points: &[LobePoint]| points.iter().reduce(lower).filter(|p| p.depth_m.is_some()).cloned();
@@ -353,6 +362,7 @@ fn assembled(robot: &Robot, tool: &CuttingTool, places: &[CutPose], all: &[LobeP
             depth_m: of_pose(k).iter().map(|p| p.depth_m).collect(),
         }
     });
+    // Per speed the lowest limit of all poses; the best speed is the one with the highest.
     let smallest = |i: usize| (0..places.len()).map(|k| &of_pose(k)[i]).reduce(lower).cloned();
     let points: Vec<LobePoint> = (0..speeds).filter_map(smallest).collect();
     let deepest = |p: &&LobePoint| p.depth_m.unwrap_or(f64::INFINITY);

@@ -1,4 +1,7 @@
 //! Compliance of arm and tool at the cutter at one pose: poles in the axes of the cut.
+//!
+//! Start at [`CutPose::at`] and [`CutPose::along`]. Frames: W world, T TCP, C cut, whose x is along
+//! the feed and z from the tip to the spindle. Not here: stability ([`crate::milling`]).
 
 use std::f64::consts::TAU;
 
@@ -40,6 +43,7 @@ pub(super) fn tip_motion(
     motion: &Motion,
     n: usize,
 ) -> Result<Vec<TipMotion>, Error> {
+    // The rigid arm at the middle of each part, and the tip shortly before and after.
     let model = robot.rigid_model()?;
     let names: Vec<&str> = model.coordinates().iter().map(|c| c.joint.as_str()).collect();
     let trajectory = motion.trajectory.with_joint_order(&names)?;
@@ -113,15 +117,16 @@ impl CutPose {
             places.push(Self::new(posed, tool, Some(t), Some(velocity / velocity.norm()))?);
         }
         if places.is_empty() {
-            {
-                let mend = "set the feed direction (feed = [...] in [tool])";
-                Err(LobesError::Input(format!("the motion never moves the tool across its axis: {mend}")).into())
-            }
-        } else {
-            Ok((places, left_out))
+            let mend = "set the feed direction (feed = [...] in [tool])";
+            let text = format!("the motion never moves the tool across its axis: {mend}");
+            return Err(LobesError::Input(text).into());
         }
+        Ok((places, left_out))
     }
 
+    /// Linearises the arm at a pose, and turns arm and tool into the axes of the cut.
+    ///
+    /// * `along`: direction of the motion, if there is one; the feed of the tool replaces it.
     fn new(posed: Posed, tool: &CuttingTool, time_s: Option<f64>, along: Option<Vector3<f64>>) -> Result<Self, Error> {
         let linear = posed.linear(&Vector6::zeros())?;
         let R_WT = linear.X_WT.rotation;
@@ -145,6 +150,7 @@ impl CutPose {
         Ok(Self { feed: R_WC.column(0).into(), axis, structure, time_s, posed, linear })
     }
 
+    /// Returns the lowest natural frequencies of arm and tool (Hz).
     pub(super) fn frequencies_hz(&self) -> Vec<f64> {
         let oscillate = self.structure.poles().iter().filter(|p| p.value.im > 0.0);
         let mut hz: Vec<f64> = oscillate.map(|p| p.value.norm() / TAU).collect();
@@ -193,12 +199,12 @@ fn structure(
     R_CW: Matrix3<f64>,
     R_WT: &Matrix3<f64>,
 ) -> Result<Structure, crate::milling::ChatterError> {
-    // Velocity of the tip: velocity of the TCP plus the effect of its angular velocity.
-    let tip = R_WT * tool.tip;
+    // v_tip = v_T + w × p with the tip p from the TCP, world axes; then in the axes of the cut.
+    let p = R_WT * tool.tip;
     let mut J = Matrix3xX::zeros(linear.J.ncols());
     for (mut column, twist) in J.column_iter_mut().zip(linear.J.column_iter()) {
         let (v, w): (Vector3<f64>, Vector3<f64>) = (twist.fixed_rows::<3>(0).into(), twist.fixed_rows::<3>(3).into());
-        column.copy_from(&(R_CW * (v + w.cross(&tip))));
+        column.copy_from(&(R_CW * (v + w.cross(&p))));
     }
     let arm = Structure::from_matrices(&linear.M, &linear.D, &linear.K, &J)?;
     Ok(arm.in_series(&Structure::from_modes(&tool_modes(tool, &(R_CW * R_WT)))?))

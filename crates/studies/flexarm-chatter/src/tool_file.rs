@@ -1,5 +1,8 @@
 //! File of a cutting tool (`docs/lobes.md`): cutter, engagement, spindle speeds, position of the
 //! tip, flexibility. Units are converted here.
+//!
+//! Start at [`CuttingTool::load`]. Directions stay in the axes in which the file gives them
+//! ([`Direction`]). Not here: plausible ranges, which are caveats ([`super::caveats`]).
 
 use std::ops::Range;
 use std::path::Path;
@@ -12,7 +15,7 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use flexarm_run::robot_file::Source;
-use flexarm_run::toml_file::parsed;
+use flexarm_run::toml_file::{parsed, word};
 use flexarm_run::{Error, RobotFileError};
 
 /// Contents of the file as written.
@@ -194,9 +197,9 @@ impl CuttingTool {
         let file: ToolFile = parsed(&text, &source, &[], |file: &ToolFile| &file.format)?;
         let reader = Reader {
             source: &source,
-            length: unit("lengths", &file.lengths, &LENGTHS, &source)?,
-            angle: unit("angles", &file.angles, &ANGLES, &source)?,
-            pressure: unit("pressures", &file.pressures, &PRESSURES, &source)?,
+            length: word(&source, "lengths", &file.lengths, &LENGTHS)?.1,
+            angle: word(&source, "angles", &file.angles, &ANGLES)?.1,
+            pressure: word(&source, "pressures", &file.pressures, &PRESSURES)?.1,
         };
         let name = path.file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
         reader.tool(&file, name)
@@ -217,19 +220,6 @@ impl CuttingTool {
     }
 }
 
-fn unit(
-    key: &str,
-    given: &Option<Spanned<String>>,
-    known: &[(&'static str, f64)],
-    source: &Source,
-) -> Result<f64, RobotFileError> {
-    let Some(word) = given else { return Ok(known[0].1) };
-    known.iter().find(|(name, _)| name == word.get_ref()).map(|found| found.1).ok_or_else(|| {
-        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-        source.error(word.span(), format!("{key} = {:?} is not known; use one of {names:?}", word.get_ref()))
-    })
-}
-
 /// Data for reading entries.
 struct Reader<'a> {
     source: &'a Source,
@@ -239,6 +229,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
+    /// Returns the tool.
     fn tool(&self, file: &ToolFile, name: String) -> Result<CuttingTool, Error> {
         let cutter = self.cutter(&file.cutter, &file.engagement)?;
         let deepest = match &file.deepest {
@@ -265,6 +256,7 @@ impl Reader<'_> {
         })
     }
 
+    /// Reads teeth, angles and coefficients; a mistaken unit of the coefficients is refused.
     fn cutter(&self, entry: &Spanned<CutterEntry>, engagement: &Spanned<EngagementEntry>) -> Result<Cutter, Error> {
         let e = entry.get_ref();
         let teeth = match *e.teeth.get_ref() {
@@ -282,6 +274,7 @@ impl Reader<'_> {
                 format!("{what} is {:.2} degrees, expected {low} to {:.0}", found.to_degrees(), high.to_degrees());
             Err(self.error(value.span(), message))
         };
+        // Coefficients in N/m², then the cutter as a whole.
         let k = e.coefficients.get_ref();
         let coefficients = Coefficients {
             tangential: k.tangential * self.pressure,
@@ -311,6 +304,7 @@ impl Reader<'_> {
         Ok(cutter)
     }
 
+    /// Reads the range of angles in which a tooth cuts; each kind has its own keys.
     fn engagement(&self, entry: &Spanned<EngagementEntry>, diameter: f64) -> Result<Engagement, Error> {
         let e = entry.get_ref();
         let kind = e.kind.get_ref().as_str();
@@ -343,6 +337,7 @@ impl Reader<'_> {
         }
     }
 
+    /// Returns the radial depth of cut over the diameter.
     fn immersion(&self, e: &EngagementEntry, place: Range<usize>, diameter: f64) -> Result<f64, Error> {
         let (part, span) = match (&e.ae, &e.immersion) {
             (Some(ae), None) => (self.length * *ae.get_ref() / diameter, ae.span()),
@@ -358,6 +353,7 @@ impl Reader<'_> {
         Err(self.error(span, format!("the radial depth is {part:.4} diameters, expected above 0, at most 1")))
     }
 
+    /// Reads entry and exit angle.
     fn angles(&self, e: &EngagementEntry, place: Range<usize>) -> Result<Engagement, Error> {
         let (Some(from), Some(to)) = (&e.entry, &e.exit) else {
             return Err(self.error(place, "kind = \"angles\" needs entry = ... and exit = ..."));
@@ -377,8 +373,10 @@ impl Reader<'_> {
         Ok(Engagement { entry, exit: exit.min(entry + turn) })
     }
 
+    /// Reads the spindle speeds (1/min): a list, or a range.
     fn speeds(&self, entry: &Spanned<SpindleEntry>) -> Result<Vec<f64>, Error> {
         let e = entry.get_ref();
+        // Either the speeds themselves, or a range with a number of equal steps.
         match (&e.rpm, &e.from, &e.to) {
             (Some(list), None, None) if e.points.is_none() => {
                 let rpm = list.get_ref();
@@ -417,13 +415,7 @@ impl Reader<'_> {
         value: &Option<Spanned<[f64; 3]>>,
         axes: &Option<Spanned<String>>,
     ) -> Result<Option<Direction>, Error> {
-        let world = match axes.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
-            None | Some(("tcp", _)) => false,
-            Some(("world", _)) => true,
-            Some((other, span)) => {
-                return Err(self.error(span, format!("{its_axes} = {other:?} is not known; use \"tcp\" or \"world\"")));
-            }
-        };
+        let world = word(self.source, its_axes, axes, &[("tcp", false), ("world", true)])?.1;
         match (value, axes) {
             (Some(value), _) => {
                 let direction = self.unit_vector(what, *value.get_ref(), value.span())?;
@@ -436,6 +428,7 @@ impl Reader<'_> {
         }
     }
 
+    /// Reads a mode of the tool; modal mass or stiffness follows from the other and the frequency.
     fn mode(&self, entry: &Spanned<ModeEntry>) -> Result<ToolMode, Error> {
         let e = entry.get_ref();
         let direction = match e.direction.get_ref() {
@@ -451,6 +444,7 @@ impl Reader<'_> {
                 ToolDirection::Along(self.unit_vector("direction", *vector, e.direction.span())?)
             }
         };
+        // m = k / ω²; both must be those of a tool or a spindle.
         let omega = std::f64::consts::TAU * self.positive("frequency", &e.frequency, 1.0, Quantity::FREQUENCY)?;
         let mass = match (&e.mass, &e.stiffness) {
             (Some(mass), None) => {
@@ -490,10 +484,12 @@ impl Reader<'_> {
         self.located(value.span(), Quantity::LENGTH.check_all(what, &point)).map(|()| point)
     }
 
+    /// Adds the place to a number out of range.
     fn located<T>(&self, span: Range<usize>, checked: Result<T, OutOfRange>) -> Result<T, Error> {
         checked.map_err(|outside| self.error(span, outside.to_string()))
     }
 
+    /// Returns a direction of length 1.
     fn unit_vector(&self, what: &str, value: [f64; 3], span: Range<usize>) -> Result<Vector3<f64>, Error> {
         let vector = Vector3::from(value);
         let size = vector.norm();

@@ -1,4 +1,6 @@
 //! Caveats of a compensation.
+//!
+//! [`of`] collects them. Not here: joint limits themselves ([`super::limits`]).
 
 use std::sync::Arc;
 
@@ -102,6 +104,7 @@ pub(super) fn of(
     found: &Commands,
     request: &CompensateRequest,
 ) -> Vec<Finding> {
+    // Joint limits, effects that are not in the model, and a small gain.
     let mut caveats = Vec::new();
     let worse: Vec<&str> = limits::worse(&answer.limits, own).map(|limit| limit.message.as_str()).collect();
     if !worse.is_empty() {

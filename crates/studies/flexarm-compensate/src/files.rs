@@ -1,4 +1,6 @@
 //! Files of a compensation: the new motion, the page, the recording of the arm before and after.
+//!
+//! [`Files::of`] checks all paths before anything is computed; [`Files::write`] writes all or none.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -52,6 +54,7 @@ impl Files {
         request: &CompensateRequest,
         answer: &mut Compensation,
     ) -> Option<Corrected> {
+        // A program that cannot be corrected leaves the motion as the result.
         let place = self.program.as_ref()?;
         let mut warn = |text: String, help: &str| {
             answer.caveats.push(Finding::warning("program", "compensation", text, help));
@@ -63,6 +66,7 @@ impl Files {
                 return None;
             }
         };
+        // Targets left as they are, a residual of the written text, effects between the targets.
         let ProgramFigures { targets, corrected: done, left, residual_m, .. } = &corrected.figures;
         if let (true, Some(first)) = (done < targets, left.first()) {
             let text = format!(

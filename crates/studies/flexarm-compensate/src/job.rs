@@ -1,20 +1,25 @@
 //! A motion on the model, and the commands that bring the flexible TCP to the pose of the rigid
 //! one.
+//!
+//! Start at [`Job::dynamic`] and [`Job::at_rest`]. Errors are 6×N, displacement and rotation vector
+//! of the flexible TCP from the desired pose, world axes, one column per sample; changes are m×N,
+//! one row per joint. Not here: the inverse of the linearised arm ([`Inversion`]), which plants are
+//! judged ([`super::judge`]).
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use flexarm_analysis::{Inversion, Node, NodeServo};
 use flexarm_kinematics::{Data, Pose, Wrench, forward_kinematics, rotation_vector};
-use flexarm_stepping::{Friction, Held, Plant, Servo, ServoAxis, TimedWrench, linearise, static_targets};
-use flexarm_trajectory::{Extreme, JointKnots, Trajectory};
-use nalgebra::{DMatrix, DVector, Quaternion, Rotation3, Translation3, UnitQuaternion};
-use rayon::prelude::*;
-
-use super::{CompensateError, CompensateRequest, Stop};
 use flexarm_run::prepare::loaded;
 use flexarm_run::robot::tcp_frame;
 use flexarm_run::{AppliedLoad, Arm, Error, Motion, RunOptions, RunRequest, Scenario};
+use flexarm_stepping::{Friction, Held, Plant, Servo, ServoAxis, TimedWrench, linearise, static_targets};
+use flexarm_trajectory::{Extreme, JointKnots, Trajectory};
+use nalgebra::{DMatrix, DVector, Matrix6xX, Quaternion, Rotation3, Translation3, UnitQuaternion};
+use rayon::prelude::*;
+
+use super::{CompensateError, CompensateRequest, Stop};
 
 /// Maximum time between two nodes at which the arm is linearised (s).
 const NODE_S: f64 = 0.02;
@@ -90,6 +95,7 @@ pub(super) struct Discarded {
 }
 
 impl<'a> Job<'a> {
+    /// Samples the motion, and the desired poses along it.
     pub(super) fn new(
         arm: &'a Arc<Arm>,
         scenario: &'a Scenario,
@@ -127,6 +133,7 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// Returns the sampling interval (s).
     pub(super) fn step_s(&self) -> f64 {
         self.times[1]
     }
@@ -198,6 +205,7 @@ impl<'a> Job<'a> {
         let mut progress = |_, _| if (self.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let request = RunRequest { progress: Some(&mut progress), ..RunRequest::default() };
         let run = arm.simulate_with(self.along(motion), &options, request)?;
+        // Displacement and rotation of the TCP from the desired pose, at the samples of this job.
         let (t, p, r) = (run.time_s(), run.values("tcp_position"), run.values("tcp_quaternion_wxyz"));
         let times = self.times_and(beyond);
         let mut error = DMatrix::zeros(6, times.len());
@@ -220,6 +228,7 @@ impl<'a> Job<'a> {
             error.fixed_view_mut::<3, 1>(0, k).copy_from(&moved);
             error.fixed_view_mut::<3, 1>(3, k).copy_from(&turned);
         }
+        // Maximum effort of each drive.
         let (m, effort) = (self.q.nrows(), run.values("effort"));
         let worst = |k: usize| {
             let zero = Extreme { time_s: 0.0, value: 0.0 };
@@ -288,8 +297,7 @@ impl<'a> Job<'a> {
         let servo = start.servo.as_ref().map(|servo| controllers(servo, &q, &start.friction));
         let plant = start.along(Arc::new(Held(q))).with_servo_opened();
         let at = linearise(&plant, &arm.tcp, &Wrench::zeros(), 0.0).map_err(|error| arm.explained(error))?;
-        let rows =
-            |M: &nalgebra::Matrix6xX<f64>| DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)]);
+        let rows = |M: &Matrix6xX<f64>| DMatrix::from_fn(self.rows.len(), M.ncols(), |i, j| M[(self.rows[i], j)]);
         let (J, J_a) = (rows(&at.J), rows(&at.J_a));
         Ok(Node { M: at.M, D: at.D, K: at.K, M_a: at.M_a, D_a: at.D_a, K_a: at.K_a, J, J_a, servo })
     }
@@ -316,6 +324,7 @@ impl<'a> Job<'a> {
     /// increases the RMS or the largest error by more than a factor of 1/[`SETTLED`] is discarded,
     /// and the next one corrects up to half the frequency.
     pub(super) fn dynamic(&self) -> Result<Commands, Error> {
+        // Error of the unchanged motion, held at its end as long as the inverse looks ahead.
         let mut inversion = self.inversion()?;
         let (m, N) = self.q.shape();
         let within = |error: &DMatrix<f64>| error.columns(0, N).into_owned();
@@ -339,6 +348,7 @@ impl<'a> Job<'a> {
         let first = size(&error);
         let mut least = first;
         let most = if first[0] > 0.0 { self.request.iterations } else { 0 };
+        // Each iteration adds the commands that cancel the present error on the linearised arm.
         for iteration in 1..=most {
             let y = -whole.select_rows(&self.rows);
             let change = &best.change + inversion.commands(&y, self.step_s()).columns(0, N);
@@ -346,6 +356,7 @@ impl<'a> Job<'a> {
             let left = size(&within(&next));
             let [rms, largest] = [left[0] / least[0], left[1] / least[1]];
             let growth = if rms.is_nan() { rms } else { rms.max(largest) };
+            // Diverged or larger: back to the best change, corrected up to half the frequency.
             if growth.is_nan() || growth > 1.0 / SETTLED {
                 let cutoff_hz = inversion.cutoff_hz();
                 best.discarded.push(Discarded { iteration, cutoff_hz, growth });
@@ -371,6 +382,7 @@ impl<'a> Job<'a> {
                 break;
             }
         }
+        // Share of what is left that lies above the cutoff.
         let left_over = error.select_rows(&self.rows);
         best.quicker =
             inversion.quicker_than_cutoff(&left_over, self.step_s()).norm() / left_over.norm().max(f64::MIN_POSITIVE);
@@ -379,6 +391,7 @@ impl<'a> Job<'a> {
 
     /// Corrects each node to its static equilibrium, with a cubic spline between the nodes.
     pub(super) fn at_rest(&self) -> Result<Commands, Error> {
+        // Static targets at the nodes, under the mean loads there.
         let (m, N) = self.q.shape();
         let plant = self.at_start()?;
         let end = self.scenario.duration_s();
@@ -472,10 +485,14 @@ pub(super) fn averaged(
     averaged
 }
 
+/// Returns the distance of the TCP from its desired position at each sample (m).
+///
+/// * `error`: 6×N, linear part first.
 pub(super) fn distances(error: &DMatrix<f64>) -> Vec<f64> {
     error.column_iter().map(|e| e.rows(0, 3).norm()).collect()
 }
 
+/// Returns the largest distance (m).
 fn peak(error: &DMatrix<f64>) -> f64 {
     distances(error).into_iter().fold(0.0, f64::max)
 }

@@ -1,4 +1,7 @@
 //! Evaluation of commands on a plant: the model itself, another robot, or perturbed plants.
+//!
+//! The commands are found on the model and judged on plants that differ from it: [`Judge`],
+//! [`sweep`].
 
 use std::sync::Arc;
 
@@ -43,6 +46,7 @@ impl Judge {
         Ok(judge)
     }
 
+    /// Runs a motion on the plant; errors are measured from the poses that the job desires.
     pub(super) fn figures(&self, job: &Job<'_>, motion: &Motion) -> Result<PlantResult, Error> {
         let RunResult { error, efforts } = job.simulated(&self.arm, &self.run, motion)?;
         let distance = distances(&error);
@@ -95,6 +99,7 @@ pub(super) fn sweep(
         ("stiffness 30 % higher".into(), changed(robot, 1.3, 1.0), modelling),
         ("damping halved".into(), changed(robot, 1.0, 0.5), modelling),
     ];
+    // Without one kind of springs, where there are both.
     let links = !arm.spans.is_empty();
     if links && arm.springs.len() > arm.spans.len() {
         plants.push(("only drives elastic".into(), robot.clone(), Modelling { links: LinkModel::Rigid, ..modelling }));

@@ -301,6 +301,7 @@ fn attempt(
         Method::Dynamic => job.dynamic()?,
         Method::Static => job.at_rest()?,
     };
+    // Errors on the plant, before and after, and the limits that each of them violates.
     let judge = Judge::of(request, arm)?;
     let as_it_is = job.as_it_is()?;
     let before = judge.figures(&job, &as_it_is)?;
@@ -310,6 +311,7 @@ fn attempt(
     // Results that will be refused or computed again are not evaluated on other plants.
     let kept = request.limits == LimitRule::Tell || limits::worse(&limits, &own).next().is_none();
     let plants = if request.sweep && kept { sweep(robot, request, &job, arm, &found.motion)? } else { Vec::new() };
+    // The result.
     let change = |(k, joint): (usize, &str)| JointChange { joint: joint.into(), largest: found.change.row(k).amax() };
     let curves = job.times.iter().zip(before.distance.iter().zip(&after.distance)).map(|(t, (a, b))| [*t, *a, *b]);
     let mut answer = Compensation {
@@ -343,10 +345,12 @@ fn attempt(
     Ok((answer, MotionPair { scenario, motion }, own))
 }
 
+/// Checks the request against motion and arm: numbers in their ranges, joints, something that yields.
 fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Result<(), CompensateError> {
     let value = |what: &str, found: f64, expected: &str| {
         CompensateError::Input(format!("{what} is {found}, expected {expected}"))
     };
+    // Components, cutoff, step and duration.
     let motion = &scenario.motion;
     if !request.components.contains(&true) {
         return Err(CompensateError::Input(
@@ -376,6 +380,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Re
         let found = request.iterations as f64;
         return Err(value("the number of iterations", found, "at most 100"));
     }
+    // Limits and payloads, and an arm that deflects at all.
     let (found, expected) = (request.accelerations.len(), arm.joints().count());
     if found != 0 && found != expected {
         return Err(CompensateError::Input(format!(

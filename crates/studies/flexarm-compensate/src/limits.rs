@@ -1,4 +1,7 @@
 //! Joint limits: violations by commands, and their treatment.
+//!
+//! Start at [`kept`], which repeats the compensation with a slower motion until the limits are
+//! kept.
 
 use std::sync::Arc;
 
@@ -80,6 +83,7 @@ pub(super) fn kept(
     request: &CompensateRequest,
     stop: Stop<'_>,
 ) -> Result<(Compensation, MotionPair), Error> {
+    // The slower motion is compensated anew: its deflection is another one.
     let mut scenario = scenario.clone();
     let mut slowed = 1.0;
     for _ in 0..MAX_TIMES {
@@ -119,6 +123,7 @@ fn slower(limit: &MotionViolation) -> f64 {
     }
 }
 
+/// Returns the error about limits that slowing does not keep, or must not.
 fn refused(worse: &[MotionViolation], rule: LimitRule) -> CompensateError {
     let limits: Vec<&str> = worse.iter().map(|limit| &*limit.message).collect();
     let limits = limits.join("; ");

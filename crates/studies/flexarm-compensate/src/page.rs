@@ -25,6 +25,7 @@ pub(super) fn html(answer: &Compensation) -> String {
         answer.cutoff_hz.map(|hz| format!(", corrected up to {hz:.1} Hz")).unwrap_or_default()
     );
     page += &warnings("", &answer.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
+    // Errors over time, and on plants that differ from the model.
     page += &curves(answer);
     page += "<h2>Other plants</h2>\n<table><tr><th>plant</th><th>peak before (mm)</th><th>peak after (mm)</th>\
              <th>RMS before (mm)</th><th>RMS after (mm)</th><th>RMS reduction</th></tr>\n";
@@ -36,6 +37,7 @@ pub(super) fn html(answer: &Compensation) -> String {
     if answer.plants.iter().any(|plant| plant.after.rms_m > plant.before.rms_m) {
         page += "<p>If the error increases, the commands correct a deflection that this plant does not have.</p>\n";
     }
+    // What the commands ask of the joints.
     page += "<h2>Maximum change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
     for change in &answer.changes {
         let _ = writeln!(
@@ -105,6 +107,7 @@ fn limits(answer: &Compensation) -> String {
     text + "</table>\n"
 }
 
+/// Returns a row of the table of plants; `name` is HTML.
 fn row(name: &str, before: &ErrorFigures, after: &ErrorFigures) -> String {
     format!(
         "<tr><td>{name}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{:.4}</td><td>{}</td></tr>\n",
@@ -116,6 +119,7 @@ fn row(name: &str, before: &ErrorFigures, after: &ErrorFigures) -> String {
     )
 }
 
+/// Plots the error over time, linear and logarithmic.
 fn curves(answer: &Compensation) -> String {
     // Limit the number of points to what the plot can show.
     let every = (answer.curves.len() / 1500).max(1);

@@ -125,6 +125,7 @@ pub(super) fn corrected(
     request: &CompensateRequest,
     [path, folder]: &[PathBuf; 2],
 ) -> Result<(Corrected, Vec<String>), Error> {
+    // The program as its controller runs it: a rigid arm, the joints at each target, the rests there.
     let model = robot.rigid_model()?;
     let cell = Cell { model: &model, tcp_link: Some(&robot.tcp.0), hold: &robot.hold, controller: &robot.controller };
     let (mut controller, _) = cell.arm(&Overrides::default());
@@ -140,6 +141,7 @@ pub(super) fn corrected(
     let rests = stops.iter().map(|stop| stop.rest_s).collect();
     let rest = AtRest::new(arm, &controller, scenario, request, rests)?;
 
+    // New values of the targets, and the text with them.
     let found: Vec<Result<TargetValues, NoCorrection>> = stops.par_iter().map(|stop| rest.target(stop)).collect();
     let mut left: Vec<(usize, String)> = Vec::new();
     let mut targets = Vec::new();
@@ -199,6 +201,7 @@ fn judged(
     again: &[Option<DVector<f64>>],
     left: &[(usize, String)],
 ) -> Result<ProgramFigures, NoCorrection> {
+    // Deviation of the TCP at each stop, of the original and of the corrected program.
     let off = |stop: &Stop<'_>| {
         let now = again.get(stop.item).and_then(Option::as_ref).ok_or(NoCorrection::OtherMoves)?;
         Ok([rest.off(stop, stop.q)?, rest.off(stop, now)?])
@@ -207,6 +210,8 @@ fn judged(
     let loaded = stops.iter().filter(|stop| rest.acts(stop.rest_s)).count();
     let mut figures = ProgramFigures { targets: stops.len(), loaded, ..ProgramFigures::default() };
     let size = |v: &Vector6<f64>, first: usize| v.fixed_rows::<3>(first).norm();
+    // Maxima: position in the first three components, orientation in the last. Targets that are left
+    // uncorrected do not count in the residual; the first of them are named.
     for (stop, [before, after]) in stops.iter().zip(off) {
         figures.before_m = figures.before_m.max(size(&before, 0));
         match left.iter().find(|(left, _)| *left == stop.item) {
@@ -228,6 +233,7 @@ fn judged(
 
 /// Lists, as sentences, the effects of loads and servos that the targets do not cover.
 fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<String> {
+    // Without loads only the servos matter.
     let mut notes = Vec::new();
     if rest.sags {
         notes.push(
@@ -248,6 +254,7 @@ fn uncovered(rest: &AtRest<'_>, stops: &[Stop<'_>], scenario: &Scenario) -> Vec<
          act while the arm is there"
             .to_owned(),
     );
+    // Targets at which the loads are not constant.
     let passed = stops.iter().filter(|stop| stop.rest_s[1] <= stop.rest_s[0] && rest.acts(stop.rest_s)).count();
     if passed > 0 {
         notes.push(format!(
@@ -296,6 +303,9 @@ struct AtRest<'a> {
 }
 
 impl<'a> AtRest<'a> {
+    /// Prepares the arm with its motors held and the mean loads of the rests.
+    ///
+    /// * `rests`: of all stops, in order of time (s).
     fn new(
         arm: &Arc<Arm>,
         controller: &'a ProgramArm<'a>,
@@ -363,6 +373,7 @@ impl<'a> AtRest<'a> {
         Frame { X_BF: self.tcp.X_BF * self.arm.X_FT.inverse() * X_FT, ..self.tcp.clone() }
     }
 
+    /// Returns the pose of a move's tool on the rigid arm.
     fn rigid(&self, of: &Move, q: &DVector<f64>) -> Pose {
         let mut data = Data::new(self.arm.model);
         forward_kinematics(self.arm.model, &mut data, q);

@@ -1,4 +1,7 @@
 //! Recording of an arm before and after its compensation.
+//!
+//! Start at [`record`]. Both runs are drawn against the rigid arm of the requested motion
+//! ([`Against`]).
 
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -23,6 +26,7 @@ pub(super) fn record(
     found: &MotionPair,
     request: &CompensateRequest,
 ) -> Result<(), Error> {
+    // One recorder per run; the first stores the rigid arm for both.
     let options = flexarm_log::CreateOptions::default().with_overwrite(request.overwrite);
     let labels = vec!["before".into(), "after".into()];
     let Some(study) = flexarm_log::study_recorder(path, options, labels) else { return Ok(()) };

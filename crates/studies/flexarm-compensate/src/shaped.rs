@@ -1,4 +1,7 @@
 //! Input shaping of a motion.
+//!
+//! Start at [`shaped`]: the modes at the end of the motion, a shaper for them, the motion as the
+//! sum of its delayed copies. Not here: the design of shapers ([`flexarm_analysis::Shaper`]).
 
 use std::sync::Arc;
 
@@ -77,6 +80,7 @@ pub struct ShapedModeFigures {
 
 /// Returns the motion of a scenario through a shaper.
 pub(super) fn shaped(arm: &Arc<Arm>, scenario: &Scenario, shaping: Shaping) -> Result<(Motion, ShaperFigures), Error> {
+    // Shaper for the modes at the end of the motion.
     let motion = &scenario.motion;
     let end = AtEnd::of(arm, scenario)?;
     let Some(first) = end.modes.first() else { return Err(CompensateError::nothing_yields().into()) };
@@ -93,6 +97,7 @@ pub(super) fn shaped(arm: &Arc<Arm>, scenario: &Scenario, shaping: Shaping) -> R
             ("optimal", found.shaper, band, modes)
         }
     };
+    // Residual vibration of each mode within its band, without and with the shaper.
     let left = |mode: &ShapedMode| {
         let at = |part: &f64| shaper.residual((1.0 + band * part) * mode.hz, mode.ratio);
         ShapedModeFigures {
@@ -150,6 +155,7 @@ struct AtEnd {
 }
 
 impl AtEnd {
+    /// Linearises the arm at the end of a motion.
     fn of(arm: &Arc<Arm>, scenario: &Scenario) -> Result<Self, Error> {
         let motion = &scenario.motion.trajectory;
         let (m, duration) = (motion.joints().len(), motion.duration());

@@ -1,4 +1,7 @@
 //! Result of `flexarm identify`, built from the result of the estimation.
+//!
+//! Start at [`answer`]. The structures are the JSON of `--json`: their names are a contract. Not
+//! here: caveats ([`super::caveats`]), the page ([`super::page`]).
 
 use std::path::Path;
 
@@ -9,11 +12,10 @@ use serde::Serialize;
 
 use super::caveats::{caveats, combinations};
 use super::encoders::EncoderFigures;
-use super::error::refused;
 use super::file::MeasurementInput;
 use crate::estimation::{
-    FittedParameter, Form, Identified, Instrument, MeasuredArm, Measurements, ModelError, NominalArm, Parameter,
-    Reading, ReadingKind, Target,
+    FittedParameter, Form, Identified, IdentifyError, Instrument, MeasuredArm, Measurements, ModelError, NominalArm,
+    Parameter, Reading, ReadingKind, Target,
 };
 
 /// Maximum number of suspicious readings in the result.
@@ -244,6 +246,7 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
         Some(k) => ["x", "y", "z"][k].to_owned(),
         None => "along its direction".to_owned(),
     };
+    // The order is that of the residuals: readings in their order, components within a reading.
     let mut all = Vec::new();
     for reading in &measurements.readings {
         match &reading.kind {
@@ -254,6 +257,7 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
             ReadingKind::TargetAt { .. } => {
                 all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
             }
+            // A pose known in advance: position, if its deviation is given, then orientation.
             ReadingKind::InstrumentAt { std, .. } => {
                 if std.is_some() {
                     all.extend(["x", "y", "z"].map(|axis| (format!("{}, {axis}", reading.name), "m")));
@@ -285,6 +289,7 @@ fn numbers(measurements: &Measurements) -> Vec<(String, &'static str)> {
     all
 }
 
+/// Returns the root mean square; NaN without values.
 pub(super) fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let n = values.len() as f64;
     (values.map(|x| x * x).sum::<f64>() / n).sqrt()
@@ -328,6 +333,10 @@ fn residuals(found: &Identified, compared: &[Compared]) -> (Residual, Option<Hel
     (Residual { before: all(&found.before), after, unit }, held_out)
 }
 
+/// Returns the result of an identification; encoders, files and further caveats are added later.
+///
+/// * `path`: file of the measurements.
+/// * `fitted`: parameters in the order of `found`.
 pub(super) fn answer(
     robot: &Robot,
     path: &Path,
@@ -337,6 +346,7 @@ pub(super) fn answer(
     found: &Identified,
 ) -> Result<Identification, Error> {
     let measurements = &input.measurements;
+    // Measured numbers with their predictions; what follows is taken from them.
     let compared = compared(nominal, measurements, found);
     let (residual, held_out) = residuals(found, &compared);
     let suspicious = found.suspicious.iter().take(MAX_SUSPICIOUS).map(|k| Suspicious {
@@ -379,6 +389,7 @@ pub(super) fn answer(
     })
 }
 
+/// Compares the measured mode shapes with the most similar modes, before and after the fit.
 fn shapes(
     nominal: &NominalArm,
     fitted: &[Parameter],
@@ -386,7 +397,7 @@ fn shapes(
     unknowns: &DVector<f64>,
 ) -> Result<Vec<ShapeFigures>, Error> {
     let arm = MeasuredArm { nominal, parameters: fitted, measurements };
-    let of = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(|error| refused(error.to_string()));
+    let of = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(IdentifyError::from);
     let (before, after) = (of(&DVector::zeros(unknowns.len()))?, of(unknowns)?);
     let figures = before.iter().zip(after).map(|((_, _, before), (number, mode, assurance))| ShapeFigures {
         reading: measurements.readings[number].name.clone(),
@@ -397,6 +408,7 @@ fn shapes(
     Ok(figures.collect())
 }
 
+/// Returns the poses of the fitted instruments in the world.
 fn frames(input: &MeasurementInput, found: &Identified) -> Vec<FoundFrame> {
     let all = input.measurements.instrument_names.iter().zip(&found.instruments).zip(&input.measurements.instruments);
     let unknown = all.filter(|(_, given)| !matches!(given, Instrument::Known(_)));
@@ -408,6 +420,7 @@ fn frames(input: &MeasurementInput, found: &Identified) -> Vec<FoundFrame> {
     unknown.map(frame).collect()
 }
 
+/// Returns the positions of the fitted targets.
 fn points(input: &MeasurementInput, found: &Identified) -> Vec<FoundPoint> {
     let all = input.targets.iter().zip(&found.targets).zip(&input.measurements.targets);
     let point = |(k, ((name, p), _)): (usize, ((&String, &Vector3<f64>), _))| FoundPoint {

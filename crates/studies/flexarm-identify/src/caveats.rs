@@ -1,4 +1,8 @@
 //! Caveats about an identification.
+//!
+//! [`caveats`] and [`combinations`] say what the fit itself found; the others compare readings,
+//! gears and encoders with the robot. Not here: mistakes that are refused ([`super::units`],
+//! [`super::error`]).
 
 use flexarm_run::caveat::FindingKind;
 use flexarm_run::{Finding, Robot};
@@ -39,8 +43,10 @@ const ENCODER_REST: f64 = 1.5;
 /// suspect.
 const FRAME_RATIO: f64 = 0.05;
 
+/// Returns the caveats that the fit itself gives reason for.
 pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
     let mut caveats = Vec::new();
+    // The scatter differs from what the readings' deviations say.
     if let Some(factor) = found.misfit {
         let (cause, remedy) = match factor > 1.0 {
             true => (
@@ -57,6 +63,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
             format!("the residuals are {factor:.2} times as large as the standard deviations of the readings: {cause}");
         caveats.push(Finding::warning("misfit", "measurements", text, remedy));
     }
+    // Readings and prior leave parameters open.
     let unsure = |p: &&FittedParameter| !p.identifiable && !p.rigid;
     let unsure = found.parameters.iter().filter(unsure).count();
     if unsure > 0 {
@@ -64,6 +71,7 @@ pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
         let remedy = "add readings at the poses of a measurement plan, or keep values that you know";
         caveats.push(Finding::warning("not-identifiable", "measurements", text, remedy));
     }
+    // Other readings are predicted worse than without a fit.
     if let Some(held) = found.held_out.as_ref().filter(|held| held.rms > held.rms_initial) {
         let text = format!(
             "the fit predicts held-out readings worse than the unchanged robot file ({:.2} against {:.2} standard \

@@ -1,4 +1,8 @@
 //! Choice of the parameters to fit, from the file of measurements or the request.
+//!
+//! Start at [`chosen`]. The request replaces the patterns of the file; `keep`, `tie` and
+//! uncertainties of the file always apply. Not here: which parameters exist
+//! ([`super::parameters`]).
 
 use flexarm_run::{Arm, Error, Robot, TCP_FRAME};
 

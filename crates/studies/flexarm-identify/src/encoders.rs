@@ -1,5 +1,8 @@
 //! Gear stiffness from recorded positions of motors and links: torques of the rigid robot along the
 //! motion of its links, filters, and the reading for the fit.
+//!
+//! Start at [`encoder_figures`]: gears that share motors are estimated together ([`Gears`]), each
+//! recording is filtered once ([`Smooth`]). Not here: the regression ([`crate::gear_stiffness`]).
 
 use flexarm_analysis::signal::LowPass;
 use flexarm_kinematics::{Data, Mechanism, Model, State, inverse_dynamics};
@@ -109,10 +112,12 @@ pub(super) fn encoder_figures(
     let coupling = arm.robot().coupling.as_ref();
     let is_coupled = |joint: &String| coupling.is_some_and(|coupling| coupling.joints.contains(joint));
     let all = candidates(arm.robot(), arm);
+    // Joints without an encoder deflect with the stiffness of the robot file.
     let filed = |joint: &String| gearbox_of(&all, joint).filter(|_| !is_coupled(joint)).map(|p| p.initial);
     let filed: Vec<Option<f64>> = joints.iter().map(filed).collect();
     let runs = input.recordings.iter().map(|recording| Smooth::of(recording, &model, &filed));
     let runs = runs.collect::<Result<Vec<_>, Error>>()?;
+    // Each gear by itself, coupled gears together.
     let single = joints.iter().filter(|joint| !is_coupled(joint)).map(|joint| {
         let C = DMatrix::from_element(1, 1, 1.0);
         Gears::of(&runs, &joints, (std::slice::from_ref(joint), C), chosen, &all)
@@ -171,6 +176,7 @@ impl<'a> Gears<'a> {
         chosen: &'a [Candidate],
         all: &'a [Candidate],
     ) -> Result<Option<Self>, Error> {
+        // Gears with an encoder on the link side; coupled ones need it in all recordings.
         let place = |joint: &String| of_robot.iter().position(|own| own == joint);
         let places: Vec<usize> = joints.iter().filter_map(place).collect();
         let has = |run: &Smooth<'_>, k: usize| run.recording.link[places[k]].is_some();
@@ -187,6 +193,7 @@ impl<'a> Gears<'a> {
             );
             return Err(at_place(file, text));
         }
+        // Motors whose springs deflect one of these encoders.
         let shown = |motor: &usize| outputs.iter().any(|i| C[(*i, *motor)] != 0.0);
         let unknown: Vec<(usize, &Parameter)> = (0..places.len())
             .filter(shown)
@@ -275,6 +282,7 @@ impl<'a> Smooth<'a> {
     ///
     /// * `filed`: stiffness of each joint's gearbox in the robot file.
     fn of(recording: &'a EncoderRecording, model: &Model, filed: &[Option<f64>]) -> Result<Self, Error> {
+        // The filter needs a cut-off below the sampling rate, and samples between both edges.
         let EncoderRecording { step_s, below_hz, edge_s, .. } = *recording;
         let n = recording.motor[0].len();
         let edge = (edge_s / step_s).round() as usize;
@@ -303,6 +311,7 @@ impl<'a> Smooth<'a> {
                 link[k].iter_mut().zip(twist).for_each(|(link, torque)| *link -= torque / stiffness);
             }
         }
+        // Torques along the motion of the links, and along that of the motors as instruments.
         let smoothed = |torque: Vec<Vec<f64>>| -> Vec<Vec<f64>> {
             let measured = |(computed, own): (Vec<f64>, &Option<Vec<f64>>)| match own {
                 Some(own) => low.of(&low.of(own)),
@@ -345,7 +354,9 @@ impl<'a> Smooth<'a> {
     }
 }
 
-/// Computes the torques of the rigid robot along a motion, one list per joint.
+/// Computes the torques of the rigid robot along a motion (N m or N), one list per joint.
+///
+/// * `motion`: joint positions (rad or m), one list per joint; `step_s`: their sampling interval.
 fn torques(model: &Model, motion: &[Vec<f64>], step_s: f64) -> Vec<Vec<f64>> {
     let (m, n) = (motion.len(), motion[0].len());
     let rates: Vec<[Vec<f64>; 2]> = motion.iter().map(|q| derivatives(q, step_s)).collect();

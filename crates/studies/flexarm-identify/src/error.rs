@@ -2,19 +2,31 @@
 
 use flexarm_run::{Error, ExternalError, RobotFileError};
 
-use crate::estimation::{FoundSlip, Slip};
+use crate::estimation::{FoundSlip, IdentifyError, Slip};
 
-/// Measurements that cannot be used for an identification; the message has what was found and the
-/// remedy.
+/// Measurements that cannot be used for an identification.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{0}")]
-pub struct IdentifyFileError(String);
+#[non_exhaustive]
+pub enum IdentifyFileError {
+    /// The readings have no estimate, or the model no solution for them.
+    #[error(transparent)]
+    Estimate(#[from] IdentifyError),
+    /// The readings do not fit the robot or the request: what was found and the remedy.
+    #[error("{0}")]
+    Input(String),
+}
 
 impl ExternalError for IdentifyFileError {}
 
+impl From<IdentifyError> for Error {
+    fn from(error: IdentifyError) -> Self {
+        Self::External(Box::new(IdentifyFileError::from(error)))
+    }
+}
+
 /// Returns the error with a message.
 pub(super) fn refused(message: impl Into<String>) -> Error {
-    Error::External(Box::new(IdentifyFileError(message.into())))
+    Error::External(Box::new(IdentifyFileError::Input(message.into())))
 }
 
 /// Returns an error at a place of the file of measurements.

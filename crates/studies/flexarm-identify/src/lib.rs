@@ -151,8 +151,7 @@ pub fn identify_robot_watched(
     // The fit, and what limits its validity.
     let options =
         IdentifyOptions { search: Search { loss: input.loss, ..Search::default() }, ..IdentifyOptions::default() };
-    let found = identify(&nominal, &parameters, &input.measurements, &options, watch)
-        .map_err(|error| refused(error.to_string()))?;
+    let found = identify(&nominal, &parameters, &input.measurements, &options, watch)?;
     let mut answer = answer(robot, measurements, &nominal, &parameters, &input, &found)?;
     answer.caveats.extend(frame_caveat(&answer));
     answer.caveats.extend(gear_caveat(robot));

@@ -25,6 +25,7 @@ pub(super) fn html(answer: &Identification) -> String {
     page += &headline(answer);
     page += &warnings("", &answer.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
     page += &parameters(answer);
+    // What the fit found beside the parameters.
     if !(answer.instruments.is_empty() && answer.targets.is_empty()) {
         page += "<h2>Instruments and targets</h2>\n";
     }
@@ -39,6 +40,7 @@ pub(super) fn html(answer: &Identification) -> String {
         let _ = writeln!(page, "<p>Target {name}: {at} mm in the axes of {link}</p>");
     }
     page += &suspicious(answer);
+    // Residuals, one plot per kind and unit; then curves.
     let mut drawn: Vec<(&str, &str)> = Vec::new();
     for c in &answer.compared {
         if !drawn.contains(&(c.kind, c.unit)) {

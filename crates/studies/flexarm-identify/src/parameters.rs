@@ -1,5 +1,9 @@
 //! Identifiable parameters of a robot file: their names, their effect on the arm, and their places
 //! in the file. `docs/identify.md` lists the names.
+//!
+//! Start at `candidates`, which has one function per kind of element. A `Candidate` joins the
+//! effect on the arm (`Effect`) with the place in the file (`ParameterLocation`). Not here:
+//! writing to these places (`super::rewrite`), the search coordinates (`crate::Parameter`).
 
 use flexarm_flexlink::{GearStiffness, SEAT};
 use flexarm_kinematics::{JointMotion, LinkInertia, SpatialInertia};
@@ -60,6 +64,7 @@ pub(crate) struct Candidate {
 
 /// Returns all parameters of an arm, in the order of drives, links, tool and payload.
 pub(crate) fn candidates(robot: &Robot, arm: &Arm) -> Vec<Candidate> {
+    // Springs of a drive or a link, by number.
     let of = |owner: Owner| -> Vec<usize> {
         arm.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
     };
@@ -101,6 +106,7 @@ fn mass_parameters(link: &str, inertia: LinkInertia, robot: &Robot, arm: &Arm) -
     let frame = arm.model.frame(link).filter(|_| flexible.is_none_or(|own| own.beam.is_some()));
     let Some(frame) = frame else { return Vec::new() };
     let parts = match arm.spans.iter().position(|span| span.link == link && flexible.is_some()) {
+        // A rigid link has one part, a lumped beam one before each spring and one behind the last.
         None => vec![LinkPart { body: frame.body, X_BL: frame.X_BF, inertia }],
         Some(number) => {
             let Some(chain) = &arm.spans[number].lumped else { return Vec::new() };
@@ -119,6 +125,7 @@ fn mass_parameters(link: &str, inertia: LinkInertia, robot: &Robot, arm: &Arm) -
         return Vec::new();
     }
     let written = ParameterLocation::Mass { link: link.to_owned(), flexible: flexible.is_some() };
+    // Its mass; the centre of mass only of rigid links, whose file has one.
     let effect = |axis, size| Effect::Link { parts: parts.clone(), axis, size };
     let mass = effect(None, INERTIAL * inertia.mass);
     let mut found = vec![Candidate::new(format!("link.{link}.mass"), "kg", inertia.mass, mass, written)];

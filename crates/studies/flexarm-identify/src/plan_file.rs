@@ -19,8 +19,8 @@ use super::error::refused;
 use super::plan_load::Efforts;
 use super::{joints_of, nominal};
 use crate::estimation::{
-    Component, LoadCase, MeasuredArm, Measurements, NominalArm, Parameter, Plan, PlanOptions, Reading, ReadingKind,
-    Row, plan,
+    Component, IdentifyError, LoadCase, MeasuredArm, Measurements, NominalArm, Parameter, Plan, PlanOptions, Reading,
+    ReadingKind, Row, plan,
 };
 
 /// Number of candidate poses if none are given.
@@ -295,14 +295,13 @@ fn plans(
     candidates: &[Reading],
     options: &PlanOptions,
 ) -> Result<[Plan; 2], Error> {
-    let plan_of =
-        |candidates: &[Reading]| plan(nominal, fitted, candidates, options).map_err(|error| refused(error.to_string()));
-    let best = plan_of(candidates)?;
+    let plan = |candidates: &[Reading]| plan(nominal, fitted, candidates, options).map_err(IdentifyError::from);
+    let best = plan(candidates)?;
     if best.chosen.len() < options.count {
         let text = format!("only {} of {} readings are possible at these poses", best.chosen.len(), options.count);
         return Err(refused(text));
     }
-    Ok([best, plan_of(&candidates[..options.count.min(candidates.len())])?])
+    Ok([best, plan(&candidates[..options.count.min(candidates.len())])?])
 }
 
 /// Returns the expected uncertainty of a parameter from that of its search coordinate.
@@ -380,7 +379,7 @@ fn planned(
         let reading = displacement(&q, &Setup { direction: None, ..setup }, 1.0);
         let measurements = Measurements { readings: vec![reading], ..Measurements::default() };
         let arm = MeasuredArm { nominal, parameters: &[], measurements: &measurements };
-        let moved = arm.predicted(&DVector::zeros(0)).map_err(|e| refused(e.to_string()))?;
+        let moved = arm.predicted(&DVector::zeros(0)).map_err(IdentifyError::from)?;
         let Setup { force, at, point, direction } = setup;
         Ok(PlannedReading { joints: q, force, at, point, direction, expected_m: [moved[0], moved[1], moved[2]] })
     };

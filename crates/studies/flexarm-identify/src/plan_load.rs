@@ -1,4 +1,7 @@
 //! Loads of planned measurements that the drives can hold.
+//!
+//! Efforts are those of the rigid arm's drives at rest, linear in the applied force. Frames: force
+//! in world axes at a point of the tool.
 
 use flexarm_kinematics::Wrench;
 use flexarm_run::{Arm, Error};

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use flexarm_files::{NumberTable, TextFileError, named_file};
 use flexarm_kinematics::{Data, Frame, Pose, forward_kinematics};
 use flexarm_run::Error;
+use flexarm_run::toml_file::word;
 use flexarm_settings::Place;
 use nalgebra::{Complex, DVector, Rotation3, Translation3, Vector3};
 use serde::Deserialize;
@@ -100,18 +101,18 @@ impl Direction {
 }
 
 /// Units by name: measured quantity and factor to SI units.
-const UNITS: [(&str, Answer, f64); 11] = [
-    ("m/N", Answer::Receptance, 1.0),
-    ("mm/N", Answer::Receptance, 1e-3),
-    ("um/N", Answer::Receptance, 1e-6),
-    ("m/s/N", Answer::Mobility, 1.0),
-    ("mm/s/N", Answer::Mobility, 1e-3),
-    ("m/s2/N", Answer::Accelerance, 1.0),
-    ("mm/s2/N", Answer::Accelerance, 1e-3),
-    ("g/N", Answer::Accelerance, GRAVITY),
-    ("m/s^2/N", Answer::Accelerance, 1.0),
-    ("mm/s^2/N", Answer::Accelerance, 1e-3),
-    ("mm/kN", Answer::Receptance, 1e-6),
+const UNITS: [(&str, (Answer, f64)); 11] = [
+    ("m/N", (Answer::Receptance, 1.0)),
+    ("mm/N", (Answer::Receptance, 1e-3)),
+    ("um/N", (Answer::Receptance, 1e-6)),
+    ("m/s/N", (Answer::Mobility, 1.0)),
+    ("mm/s/N", (Answer::Mobility, 1e-3)),
+    ("m/s2/N", (Answer::Accelerance, 1.0)),
+    ("mm/s2/N", (Answer::Accelerance, 1e-3)),
+    ("g/N", (Answer::Accelerance, GRAVITY)),
+    ("m/s^2/N", (Answer::Accelerance, 1.0)),
+    ("mm/s^2/N", (Answer::Accelerance, 1e-3)),
+    ("mm/kN", (Answer::Receptance, 1e-6)),
 ];
 
 /// Frequency (Hz), value in SI units, and its standard deviation if the file has one.
@@ -140,13 +141,8 @@ impl Reader<'_> {
             "uff" | "unv" | "ufb" | "bunv" => self.universal(&path, e)?,
             _ => vec![self.curve(&path, e)?],
         };
-        let form = match e.form.as_ref().map(|word| (word.get_ref().as_str(), word)) {
-            None | Some(("log", _)) => Form::Logarithmic,
-            Some(("complex", _)) => Form::Complex,
-            Some((other, at)) => {
-                return Err(self.error(at, format!("form = {other:?} is not known; use \"log\" or \"complex\"")));
-            }
-        };
+        let form = word(self.source, "form", &e.form, &[("log", Form::Logarithmic), ("complex", Form::Complex)])?.1;
+        // All curves of the file at one pose, each with its points and nodes.
         let (q, load) = (self.joints(&e.joints)?, self.load(&e.load, &site)?);
         let own = self.std(located(&e.std), 1.0)?;
         for curve in curves {
@@ -192,15 +188,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Returns the measured quantity and the factor of a unit.
-    fn unit(&self, unit: &Spanned<String>) -> Result<(Answer, f64), Error> {
-        let found = UNITS.iter().find(|(name, ..)| name == unit.get_ref());
-        found.map(|(_, answer, factor)| (*answer, *factor)).ok_or_else(|| {
-            let names: Vec<&str> = UNITS.iter().map(|(name, ..)| *name).collect();
-            self.error(unit, format!("unit = {:?} is not known; use one of {names:?}", unit.get_ref()))
-        })
-    }
-
     /// Reads a response from a table.
     fn curve(&self, path: &Path, e: &ResponseEntry) -> Result<Curve, Error> {
         let table = NumberTable::read(path)?;
@@ -209,6 +196,7 @@ impl Reader<'_> {
             let text = format!("column {stray:?} is not known; expected hz, re and im or magnitude and phase, and std");
             return Err(table.error(None, text).into());
         }
+        // Columns, and the unit of the values.
         let column = |name: &str| table.column(name);
         let hz = column("hz").ok_or_else(|| table.error(None, "there is no column hz"))?;
         let pair = match (column("re"), column("im"), column("magnitude"), column("phase")) {
@@ -216,13 +204,11 @@ impl Reader<'_> {
             (None, None, Some(size), Some(phase)) => (size, phase, true),
             _ => return Err(table.error(None, "expected the columns re and im, or magnitude and phase").into()),
         };
-        let Some(unit) = &e.unit else {
-            return Err(self.error(
-                &e.file,
-                "a table needs the unit of the measured quantity per force, such as unit = \"m/s2/N\"",
-            ));
-        };
-        let (answer, factor) = self.unit(unit)?;
+        if e.unit.is_none() {
+            let text = "a table needs the unit of the measured quantity per force, such as unit = \"m/s2/N\"";
+            return Err(self.error(&e.file, text));
+        }
+        let (answer, factor) = word(self.source, "unit", &e.unit, &UNITS)?.1;
         let mut values = Vec::with_capacity(table.rows.len());
         for (number, row) in table.rows.iter().enumerate() {
             let (f, a, b) = (row[hz], row[pair.0], row[pair.1]);
@@ -234,6 +220,7 @@ impl Reader<'_> {
             let value = if pair.2 { Complex::from_polar(a, b * self.units.angle) } else { Complex::new(a, b) };
             values.push((f, value * factor, std));
         }
+        // A table names one pair of points.
         let of = |node: &Option<Spanned<String>>, direction: &Option<Spanned<Direction>>, what: &str| {
             let Some(direction) = direction else {
                 return Err(self.error(&e.file, format!("a table needs a direction, such as {what}_direction = \"x\"")));
@@ -262,11 +249,12 @@ impl Reader<'_> {
         if let Some(node) = given {
             return Err(self.error(node, "a universal file contains nodes and directions: remove them here"));
         }
+        // Each function names its pair of points by node numbers.
         let functions = read_functions(path, &bytes)?;
         let one = |function: &UffFunction| {
             let name = Place::of_file(e.file.get_ref().display()).line(function.line).to_string();
             let (answer, factor) = match &e.unit {
-                Some(unit) => self.unit(unit)?,
+                Some(_) => word(self.source, "unit", &e.unit, &UNITS)?.1,
                 None => unit_of(function).ok_or_else(|| {
                     let what = &function.unit;
                     self.error(
@@ -339,6 +327,7 @@ impl Reader<'_> {
         q: &[f64],
         site: &Site<'_>,
     ) -> Result<Probe, Error> {
+        // Point: the tool, or a node on a link.
         let arm = self.cell.arm;
         let tool = || arm.tcp.clone();
         let Some(name) = name else { return Ok(Probe { frame: tool(), direction: *direction }) };
@@ -356,19 +345,15 @@ impl Reader<'_> {
         }
         let at = Translation3::from(Vector3::from(*xyz) * self.units.length);
         let frame = Frame { X_BF: frame.X_BF * Pose::from_parts(at, Rotation3::identity()), ..frame };
-        let direction = match axes.as_ref().map(|word| (word.get_ref().as_str(), word)) {
-            None | Some(("world", _)) => *direction,
-            Some(("frame", _)) => {
-                let mut all = DVector::zeros(arm.model.nv());
-                all.rows_mut(0, q.len()).copy_from_slice(q);
-                let mut data = Data::new(&arm.model);
-                forward_kinematics(&arm.model, &mut data, &all);
-                data.X_WF(&frame).rotation * direction
-            }
-            Some((other, at)) => {
-                return Err(self.error(at, format!("axes = {other:?} is not known; use \"world\" or \"frame\"")));
-            }
-        };
+        // Direction: in world axes, or in those of the frame at the pose.
+        let mut direction = *direction;
+        if word(self.source, "axes", axes, &[("world", false), ("frame", true)])?.1 {
+            let mut all = DVector::zeros(arm.model.nv());
+            all.rows_mut(0, q.len()).copy_from_slice(q);
+            let mut data = Data::new(&arm.model);
+            forward_kinematics(&arm.model, &mut data, &all);
+            direction = data.X_WF(&frame).rotation * direction;
+        }
         Ok(Probe { frame, direction })
     }
 }

@@ -1,7 +1,7 @@
 //! Replacement of values in a robot file by identified ones; everything else stays as written.
 //!
-//! Start at [`rewritten`]. Each value goes to its [`ParameterLocation`]; poses are composed of several
-//! values ([`put_tool`], [`put_frames`]). Frames: L link of the tool, T tool.
+//! Start at `rewritten`. Each value goes to its `ParameterLocation`; poses are composed of several
+//! values (`put_tool`, `put_frames`). Frames: L link of the tool, T tool.
 
 use std::path::Path;
 
@@ -64,6 +64,7 @@ fn put(file: &mut DocumentMut, found: &FittedParameter, written: &ParameterLocat
         | ParameterLocation::Mass { link, flexible: true } => {
             put_in_link(named(file, "flexible_link", "link", link)?, found, written)
         }
+        // Not in the robot file: the tool and the frames of the measurements.
         ParameterLocation::Tool { .. } | ParameterLocation::Frame { .. } => Some(()),
         ParameterLocation::Mounting { entry } => {
             put_number(inside(file.as_table_mut(), &["mounting", "stiffness"])?, Some(*entry), found)

@@ -1,4 +1,7 @@
 //! Checks of measurements against the nominal arm: modes and units.
+//!
+//! A file with wrong units is refused before the fit, which would find stiffnesses for it. Not
+//! here: joint values, whose unit the reader checks.
 
 use flexarm_run::Error;
 use nalgebra::{DVector, Vector3};

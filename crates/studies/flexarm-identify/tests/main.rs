@@ -16,6 +16,7 @@ mod least_squares;
 mod levers;
 mod parameters;
 mod placement;
+mod places;
 mod recorded_encoders;
 mod response;
 mod rewrite;

@@ -1,4 +1,7 @@
 //! Checks of the region of a map, and its places or poses.
+//!
+//! Start at [`region_of`]. Not here: inverse kinematics ([`super::finder`]), the evaluation
+//! ([`super::take`]).
 
 use flexarm_kinematics::{Data, Model, forward_kinematics};
 use flexarm_run::robot::tcp_frame;
@@ -20,11 +23,14 @@ const FEW_PLACES: f64 = 10.0;
 
 /// A checked region.
 pub(super) enum Region<'m> {
+    /// Places, their inverse kinematics, and the radius about the first joint's axis to leave out (m).
     Grid(Grid, Box<Finder<'m>>, f64),
+    /// Number of poses, and their joint values.
     Poses(usize, Box<PoseOf<'m>>),
 }
 
 impl<'m> Region<'m> {
+    /// Returns the places to evaluate, with all tool directions at each place of a grid.
     pub(super) fn as_places<'a>(&'a self, rotations: &'a [Rotation3<f64>]) -> Places<'a>
     where
         'm: 'a,
@@ -37,6 +43,7 @@ impl<'m> Region<'m> {
         }
     }
 
+    /// Returns the grid, if the region is one.
     pub(super) fn grid(&self) -> Option<Grid> {
         match self {
             Self::Grid(grid, ..) => Some(*grid),
@@ -53,6 +60,7 @@ pub(super) fn region_of<'m>(
     near: &[f64],
     rotations: &[Rotation3<f64>],
 ) -> Result<(Region<'m>, Vec<Finding>), Error> {
+    // A workpiece is placed on a grid.
     if let Some(edges) = request.workpiece_m {
         if !edges.iter().all(|edge| edge.is_finite() && *edge >= 0.0) {
             return Err(MapError::Input(format!(
@@ -107,6 +115,7 @@ fn grid_region<'m>(
         ))
         .into());
     }
+    // Inverse kinematics, in closed form or by search.
     let mut finder = Finder::new(model, tcp_frame(model), near.to_vec());
     let joints = finder.joints();
     if joints < 6 {
@@ -123,6 +132,7 @@ fn grid_region<'m>(
         caveats.push(Finding::warning("searched-poses", "map", message, "map the arm over joint values"));
     }
     caveats.extend(workspace.tool.caveat());
+    // Box and spacing, as given or from the reach, and the number of poses that they ask for.
     let bounds = workspace.bounds.unwrap_or_else(|| reach(model));
     let edge = (0..3).map(|c| bounds[1][c] - bounds[0][c]).fold(0.0, f64::max);
     let usual = if finder.is_closed() && directions < 10 { USUAL_PLACES } else { FEW_PLACES };
@@ -146,6 +156,7 @@ fn joint_region<'m>(
     model: &Model,
     near: &[f64],
 ) -> Result<(Region<'m>, Vec<Finding>), Error> {
+    // Each range names a joint once, with finite values that a joint can have.
     let actuated = &model.coordinates()[..model.n_actuated()];
     if ranges.is_empty() {
         return Err(MapError::Input("no joint is given for the map to vary".into()).into());
@@ -182,6 +193,7 @@ fn joint_region<'m>(
     if poses > MAX_PLACES as f64 {
         return Err(MapError::too_many(poses).into());
     }
+    // Pose number to joint values, as digits of a number with mixed radix.
     let near = near.to_vec();
     let values = move |pose: usize, q: &mut Vec<f64>| {
         q.extend_from_slice(&near);

@@ -1,4 +1,7 @@
 //! Columns of a map: names, units, order, and the direction of improvement.
+//!
+//! Start at [`Layout::new`]: rows are written in the same order by [`super::evaluate`]. Names end
+//! in the unit.
 
 use flexarm_stepping::Plant;
 
@@ -82,18 +85,21 @@ impl Layout {
     ) -> Self {
         let elastic = plant.n_elastic_coordinates();
         let frequencies = frequencies.min(elastic).min(MAX_FREQUENCIES);
+        // Place and pose.
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();
         columns.extend(
             joints.iter().map(|(joint, slides)| {
                 place(&format!("{joint}_{}", if *slides { "m" } else { "rad" }), "joint position")
             }),
         );
+        // Displacements under gravity, and under the load as well.
         columns.extend(displacement("sag", "displacement of the TCP relative to the rigid arm under gravity"));
         if loaded {
             let meaning = "displacement of the TCP relative to the rigid arm under gravity and the load";
             columns.extend(displacement("error", meaning));
             columns.push(less("load_m", "displacement of the TCP due to the load"));
         }
+        // Compliance: along the axes, coupling between them, worst direction; the matrix of listed poses.
         for (axis, name) in ["compliance_x_m_per_n", "compliance_y_m_per_n", "compliance_z_m_per_n"].iter().enumerate()
         {
             columns.push(less(name, &format!("displacement along {} per force along it", ["x", "y", "z"][axis])));
@@ -111,6 +117,7 @@ impl Layout {
         if matrix {
             columns.extend(full_compliance());
         }
+        // Frequencies, limit of a cutting tool, shares of the elements.
         for k in 1..=frequencies {
             let column = less(&format!("frequency_{k}_hz"), "undamped natural frequency under gravity, drives locked");
             columns.push(MapColumn { more_is_better: true, ..column });

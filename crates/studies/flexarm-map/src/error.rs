@@ -1,4 +1,4 @@
-//! Errors of a map.
+//! Errors of a map: a request without a result, or an interruption, as errors of a run.
 
 use std::path::PathBuf;
 

@@ -1,12 +1,16 @@
 //! Evaluation of the poses of a map: equilibrium, compliance, frequencies and contributions of each
 //! pose as a row of numbers.
+//!
+//! Start at [`Evaluator::push`]. Wrenches and displacements are at the TCP in world axes, linear
+//! part first. Not here: which poses are evaluated ([`super::take`]), the names of the columns
+//! ([`super::columns`]).
 
 use flexarm_analysis::tcp_error;
 use flexarm_kinematics::Wrench;
 use flexarm_stepping::{OperatingPoint, PoseAnswer, PoseOutputs};
 use nalgebra::{Matrix3, Matrix6, Vector3};
 
-use super::columns::{HEAD, Layout, MAX_FREQUENCIES};
+use super::columns::{Layout, MAX_FREQUENCIES};
 use flexarm_chatter::{CuttingTool, lowest_limit};
 use flexarm_run::{Error, Modelling, Robot, posed};
 
@@ -111,6 +115,10 @@ impl<'a> Evaluator<'a> {
     }
 }
 
+/// Appends the row of a pose, in the order of [`Layout::new`].
+///
+/// * `weighed`: results under gravity only; `found`: under the load as well.
+/// * `depth`: limit of a cutting tool (m).
 fn push_row(
     layout: &Layout,
     q: &[f64],
@@ -122,7 +130,6 @@ fn push_row(
 ) {
     rows.extend(found.rigid_tcp_pose.translation.vector.iter());
     rows.extend([label.place as f64, label.direction as f64, label.branch as f64]);
-    debug_assert_eq!(HEAD.len(), 6);
     rows.extend(q);
     let sag = &weighed.sag;
     push_displacement(sag, rows);
@@ -155,16 +162,19 @@ fn push_shares(layout: &Layout, moved: &[f64; 6], found: &PoseAnswer, rows: &mut
     }
 }
 
+/// Returns the length of a vector.
 fn size(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
+/// Appends a displacement with its norm and angle.
 fn push_displacement(moved: &[f64; 6], rows: &mut Vec<f64>) {
     rows.extend(&moved[..3]);
     rows.push(size(&moved[..3]));
     rows.push(size(&moved[3..]));
 }
 
+/// Appends the figures of a 6×6 compliance at the TCP, world axes, linear part first.
 fn push_compliance(C: &Matrix6<f64>, rows: &mut Vec<f64>) {
     rows.extend([C[(0, 0)], C[(1, 1)], C[(2, 2)]]);
     rows.extend([(0, 1), (0, 2), (1, 2)].map(|(i, j)| 0.5 * (C[(i, j)] + C[(j, i)])));
@@ -175,7 +185,9 @@ fn push_compliance(C: &Matrix6<f64>, rows: &mut Vec<f64>) {
 }
 
 /// Returns the largest singular value of a matrix and its right singular vector, signed so that its
-/// largest component is positive.
+/// largest component is positive: the largest displacement per force, and the direction of that force.
+///
+/// Returns zero vectors for a zero matrix, with the gain 0, and for one that is not finite, with NaN.
 pub fn largest_gain(C: &Matrix3<f64>) -> (f64, Vector3<f64>) {
     // Compliances are of the order of 1e-9: scaling avoids loss in their squares.
     let scale = C.amax();

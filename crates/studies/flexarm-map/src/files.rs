@@ -1,4 +1,7 @@
 //! Files of a map: table of all poses, page, recording, figures.
+//!
+//! Start at [`places`] before the computation and [`save`] after it. The table is Parquet, or CSV in
+//! builds without it. Not here: what is on the page (`page.rs`) and in the recording (`recording.rs`).
 
 use std::path::{Path, PathBuf};
 

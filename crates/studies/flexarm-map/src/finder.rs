@@ -78,6 +78,7 @@ impl<'m> Finder<'m> {
         }
     }
 
+    /// Appends the solutions that a numerical search finds from several starts.
     fn search(&mut self, X_WT: &Pose, found: &mut Vec<f64>) {
         let options = IkOptions { max_iterations: 60, ..IkOptions::default() };
         let near = DVector::from_column_slice(&self.near);

@@ -1,4 +1,7 @@
 //! Iso-surfaces of a value on a grid: marching tetrahedra.
+//!
+//! Start at [`iso_surface`]. Six tetrahedra per cube have no ambiguous case, unlike the cube itself.
+//! Not here: the grid (`region.rs`), colours and the recording (`recording.rs`).
 
 use std::collections::HashMap;
 
@@ -19,8 +22,14 @@ const TETRAHEDRA: [[usize; 4]; 6] =
     [[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
 
 /// Returns the surface on which the values of a grid equal a level, in cubes with finite values at
-/// all corners.
+/// all corners. Vertices are shared between triangles.
+///
+/// * `values`: one per place of the grid, x varying fastest.
+///
+/// # Panics
+/// Panics with another number of values.
 pub fn iso_surface(grid: &Grid, values: &[f64], level: f64) -> Surface {
+    assert_eq!(values.len(), grid.places(), "an iso-surface needs a value per place of its grid");
     let mut surface = Surface::default();
     let mut known: HashMap<(usize, usize), u32> = HashMap::new();
     let [nx, ny, nz] = grid.count;
@@ -28,15 +37,18 @@ pub fn iso_surface(grid: &Grid, values: &[f64], level: f64) -> Surface {
     for z in 0..nz.saturating_sub(1) {
         for y in 0..ny.saturating_sub(1) {
             for x in 0..nx.saturating_sub(1) {
+                // Places at the corners of a cube; without a value at one of them there is no surface.
                 let corner = |bits: usize| number(x + (bits & 1), y + (bits >> 1 & 1), z + (bits >> 2));
                 let cube: [usize; 8] = std::array::from_fn(corner);
                 if !cube.iter().all(|&k| values[k].is_finite()) {
                     continue;
                 }
+                // A cube on one side of the level is not cut.
                 let above = cube.iter().filter(|&&k| values[k] > level).count();
                 if above == 0 || above == 8 {
                     continue;
                 }
+                // Neighbours share the vertex on an edge, found by the places at its two ends.
                 for tetrahedron in TETRAHEDRA {
                     cut(tetrahedron.map(|bits| cube[bits]), values, level, &mut |a, b| {
                         let key = (a.min(b), a.max(b));

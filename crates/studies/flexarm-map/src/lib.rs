@@ -65,7 +65,7 @@ pub mod internals {
 }
 
 use self::checked_region::region_of;
-use self::columns::Layout;
+use self::columns::{Layout, PLACE};
 use self::evaluate::{Cut, Evaluator};
 use self::take::{Choice, Evaluation, take};
 use flexarm_chatter::{CuttingTool, LobesError, lowest_limit};
@@ -190,24 +190,14 @@ pub struct Map {
 impl Map {
     /// Returns the number of the place of the best pose.
     fn best_place(&self) -> usize {
-        let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
-        self.table.row(self.best.row)[place] as usize
+        self.table.row(self.best.row)[PLACE] as usize
     }
 
     /// Returns a quantity per place of the grid, for the best pose at each place; NaN for
     /// unreachable places.
     fn by_place(&self, column: usize, grid: &Grid) -> Vec<f64> {
-        let place = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
         let by = self.table.columns.iter().position(|column| column.name == self.by).unwrap_or(column);
-        let mut chosen = vec![(f64::INFINITY, f64::NAN); grid.places()];
-        for k in 0..self.table.rows() {
-            let row = self.table.row(k);
-            let (slot, cost) = (&mut chosen[row[place] as usize], self.table.cost(by, row[by]));
-            if cost < slot.0 {
-                *slot = (cost, row[column]);
-            }
-        }
-        chosen.into_iter().map(|(_, value)| value).collect()
+        self.table.best_by_place(by, column, grid).into_iter().map(|(_, value)| value).collect()
     }
 }
 
@@ -272,10 +262,12 @@ pub fn map(
         // Errors of tool or robot are the same at all poses.
         return Err(error);
     }
+    // What is computed at each pose, and which poses are kept.
     let cut = request.tool.as_ref().map(|tool| Cut { robot, modelling: &request.modelling, tool });
     let evaluator = Evaluator::new(at, &layout, request.wrench, cut);
     let choice = Choice { layout: &layout, keep: request.keep, by };
 
+    // The places, or those done when the caller stops.
     let rotations = match &request.region {
         MapRegion::Workspace(workspace) => workspace.tool.rotations()?,
         _ => Vec::new(),
@@ -288,6 +280,7 @@ pub fn map(
     if done < all && taken.rows.is_empty() {
         return Err(stopped(None).into());
     }
+    // Figures and caveats of the rows.
     let grid = places.grid();
     let table = MapTable { columns: layout.columns.clone(), values: std::mem::take(&mut taken.rows) };
     let mut found = summed_up(robot, &arm, request, table, &taken, by, (all, grid.as_ref()), rotations.len())?;
@@ -339,6 +332,7 @@ fn summed_up(
     let Some((best, worst)) = table.extremes(by) else {
         return Err(nothing_found(request, &table, taken, by, points).into());
     };
+    // Caveats of the arm where it is used, of the load, and of poses without a result.
     let joints: Vec<String> = arm.joints().map(str::to_owned).collect();
     let mut caveats = match &request.region {
         MapRegion::Along { motion, .. } => arm.caveats(Use::Along(&Scenario::new((**motion).clone()))),
@@ -421,6 +415,7 @@ fn no_placement(edges: [f64; 3]) -> Finding {
     Finding::warning("no-placement", "map", message, "use a smaller workpiece or more tool directions")
 }
 
+/// Returns the caveat about a map that was stopped.
 fn unfinished(done: usize, places: usize) -> Finding {
     let message = format!("the map was stopped: {done} of {places} places are in it");
     Finding::warning("map-stopped", "map", message, "run it to its end")

@@ -20,6 +20,7 @@ pub(super) fn html(map: &Map, grid: Option<&Grid>) -> String {
     let mut page = opening(&format!("Map of {}", map.robot));
     let _ = writeln!(page, "<p>{}</p>", markup(&in_short(map)));
     page += &warnings("", &map.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
+    // Answers first, then pictures and tables.
     if let Some(placement) = &map.placement {
         let [low, high] = [placement.lower_m, placement.upper_m].map(|c| c.map(|x| format!("{x:.3}")).join(", "));
         let centre = placement.centre_m.map(|x| format!("{x:.3}")).join(", ");
@@ -78,6 +79,7 @@ fn in_short(map: &Map) -> String {
     text + &format!(" Best and worst by {}.", titled(&map.by))
 }
 
+/// Returns the table of the distributions.
 fn quantities(map: &Map) -> String {
     let mut table = "<h2>Quantities</h2>\n<table><tr><th>quantity</th><th>minimum</th>\
                      <th>5 %</th><th>median</th><th>95 %</th><th>maximum</th></tr>\n"
@@ -96,6 +98,7 @@ fn quantities(map: &Map) -> String {
     table + "</table>\n"
 }
 
+/// Returns the table of the best and the worst pose.
 fn poses(map: &Map) -> String {
     let mut table = "<table><tr><th></th><th>best</th><th>worst</th></tr>\n".to_owned();
     let mut row = |name: &str, value: &dyn Fn(&MapPose) -> String| {
@@ -115,6 +118,7 @@ fn poses(map: &Map) -> String {
 
 /// Draws the three planes through the best place.
 fn slices(map: &Map, grid: &Grid, column: usize) -> String {
+    // Values of the best pose at each place, on one colour scale for the three planes.
     let values = map.by_place(column, grid);
     let (factor, unit) = readable(&map.table.columns[column].name);
     let [low, high] = scale(&values).map(|x| factor * x);
@@ -133,6 +137,7 @@ fn slices(map: &Map, grid: &Grid, column: usize) -> String {
                 plane.push(factor * values[index[0] + grid.count[0] * (index[1] + grid.count[1] * index[2])]);
             }
         }
+        // Best and worst place, and the workpiece, where the plane meets them.
         let range = |c: usize| [grid.lower[c], grid.lower[c] + grid.spacing_m * (grid.count[c] - 1) as f64];
         let within = |place: &[f64; 3]| (place[across] - at).abs() < 0.5 * grid.spacing_m;
         let marked = [(&map.best.place_m, "B"), (&map.worst.place_m, "W")];

@@ -1,10 +1,12 @@
 //! Placement of a workpiece: the box of places with the best worst value.
+//!
+//! Start at [`best_box`]. A cost is smaller for better places, whatever the quantity. Boxes are aligned
+//! with the world axes. Not here: costs of poses (`table.rs`), the grid (`region.rs`).
 
 use std::collections::VecDeque;
 
 use serde::Serialize;
 
-use super::columns::HEAD;
 use super::region::Grid;
 use super::table::MapTable;
 
@@ -25,24 +27,13 @@ pub struct Placement {
 
 /// Returns the best place of a workpiece on the grid, if it fits anywhere.
 pub(super) fn best_placement(table: &MapTable, grid: &Grid, by: usize, edges: [f64; 3]) -> Option<Placement> {
-    let mut found = best_box(grid, &cost_by_place(table, grid, by), edges)?;
+    // The cost of a place is that of its best row, so that of the worst pose if only that is kept.
+    let cost: Vec<f64> = table.best_by_place(by, by, grid).into_iter().map(|(cost, _)| cost).collect();
+    let mut found = best_box(grid, &cost, edges)?;
     if table.columns[by].more_is_better {
         found.worst = -found.worst;
     }
     Some(found)
-}
-
-/// Returns the cost of each place: that of its best pose among the rows, so the worst one if only
-/// that is kept.
-fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
-    let place = HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
-    let mut cost = vec![f64::INFINITY; grid.places()];
-    for k in 0..table.rows() {
-        let row = table.row(k);
-        let slot = &mut cost[row[place] as usize];
-        *slot = slot.min(table.cost(by, row[by]));
-    }
-    cost
 }
 
 /// Finds the box of the given size with the smallest maximum cost; `None` if every box contains an
@@ -53,11 +44,17 @@ fn cost_by_place(table: &MapTable, grid: &Grid, by: usize) -> Vec<f64> {
 ///
 /// Complexity: linear in the number of places, independent of the size (running maxima, axis by
 /// axis).
+///
+/// # Panics
+/// Panics without exactly one cost per place.
 pub fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement> {
+    assert_eq!(cost.len(), grid.places(), "a placement needs a cost per place of its grid");
+    // Number of places along each edge, both ends included.
     let window = size_m.map(|edge| (edge / grid.spacing_m - 1e-9).ceil().max(0.0) as usize + 1);
     if (0..3).any(|c| window[c] > grid.count[c]) {
         return None;
     }
+    // Maximum over the box that starts at each place, then the start with the smallest one.
     let mut worst = cost.to_vec();
     for (axis, window) in window.iter().enumerate() {
         running_maximum(&mut worst, grid.count, axis, *window);
@@ -66,6 +63,7 @@ pub fn best_box(grid: &Grid, cost: &[f64], size_m: [f64; 3]) -> Option<Placement
         let index = grid.index(k);
         (0..3).all(|c| index[c] + window[c] <= grid.count[c])
     });
+    // An infinite maximum means an unreachable place in every box.
     let best = starts.min_by(|&a, &b| worst[a].total_cmp(&worst[b])).filter(|&k| worst[k].is_finite())?;
     let lower_m = grid.place(best);
     let upper_m = [0, 1, 2].map(|c| lower_m[c] + grid.spacing_m * (window[c] - 1) as f64);

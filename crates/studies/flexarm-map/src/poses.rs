@@ -1,4 +1,6 @@
 //! Lists of poses read from a file.
+//!
+//! Start at [`read_poses`]. A table names its columns after joints, a TOML file lists values.
 
 use std::path::Path;
 
@@ -13,7 +15,7 @@ use super::checked_region::Region;
 use super::region::MAX_PLACES;
 use flexarm_run::inspect::joint_values;
 use flexarm_run::robot_file::Source;
-use flexarm_run::toml_file::parsed;
+use flexarm_run::toml_file::{parsed, word};
 use flexarm_run::{Error, Finding, Robot};
 
 /// Message about a list without a pose.
@@ -79,14 +81,7 @@ impl List<'_> {
         let text = read_text(path)?;
         let source = Source::new(path, &text, "map");
         let file: PosesFile = parsed(&text, &source, &[], |file: &PosesFile| &file.format)?;
-        let degrees = match file.angles.as_ref().map(|word| (word.get_ref().as_str(), word.span())) {
-            None | Some(("rad", _)) => false,
-            Some(("deg", _)) => true,
-            Some((other, span)) => {
-                let message = format!("angles = {other:?} is not known; use \"rad\" or \"deg\"");
-                return Err(source.error(span, message).into());
-            }
-        };
+        let degrees = word(&source, "angles", &file.angles, &[("rad", false), ("deg", true)])?.1;
         let mut columns = match &file.joints {
             None => (0..self.joints.len()).map(|k| (k, 1.0)).collect(),
             Some(names) => {

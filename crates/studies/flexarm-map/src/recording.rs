@@ -8,9 +8,10 @@ use flexarm_kinematics::{Data, forward_kinematics};
 use flexarm_log::{Caption, CreateOptions, RecordingFormat, RunResult, Sample, Scenery, SceneryForm, TwinSample};
 use nalgebra::{DVector, Matrix3, Rotation3, UnitQuaternion};
 
+use super::columns::PLACE;
 use super::iso_surface::iso_surface;
 use super::region::Grid;
-use super::{Map, MapPose, MapRequest, columns};
+use super::{Map, MapPose, MapRequest};
 use flexarm_chatter::rounded_down;
 use flexarm_run::record::{link_frames, robot_header};
 use flexarm_run::{Arm, Error, Robot};
@@ -144,6 +145,7 @@ pub(super) fn shown(map: &Map) -> Vec<usize> {
     shown
 }
 
+/// Returns the description of the recording, Markdown.
 fn text(map: &Map) -> String {
     let mut text =
         format!("# {}: {} of {} places are within reach\n\n", markdown(&map.robot), map.reachable, map.points);
@@ -187,7 +189,9 @@ pub(super) fn scale(values: &[f64]) -> [f64; 2] {
     }
 }
 
+/// Returns what the viewer shows beside the arm.
 fn scenery(map: &Map, grid: Option<&Grid>) -> Vec<Scenery> {
+    // Coloured places of each quantity, thinned, and those in the planes through the best place.
     let place = |k: usize| [0, 1, 2].map(|c| map.table.row(k)[c] as f32);
     let every = map.table.rows().div_ceil(MAX_POINTS).max(1);
     let rows: Vec<usize> = (0..map.table.rows()).step_by(every).collect();
@@ -210,6 +214,7 @@ fn scenery(map: &Map, grid: Option<&Grid>) -> Vec<Scenery> {
             all.push(Scenery { view, name: "slices".into(), form: points(&slice, 0.45 * size) });
         }
     }
+    // Surfaces, ellipsoids, and marks in all views.
     if let Some(grid) = grid {
         all.extend(surfaces(map, grid));
     }
@@ -238,10 +243,9 @@ fn size_of(map: &Map, grid: Option<&Grid>) -> f32 {
 
 /// Rows in the three planes through the place of the best pose.
 fn slices(map: &Map, grid: &Grid) -> Vec<usize> {
-    let number = columns::HEAD.iter().position(|(name, _)| *name == "place").unwrap_or_default();
     let centre = grid.index(map.best_place());
     let within = |&k: &usize| {
-        let index = grid.index(map.table.row(k)[number] as usize);
+        let index = grid.index(map.table.row(k)[PLACE] as usize);
         (0..3).any(|c| index[c] == centre[c])
     };
     (0..map.table.rows()).filter(within).collect()

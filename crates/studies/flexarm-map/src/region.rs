@@ -1,4 +1,7 @@
 //! Region of a map: TCP positions on a grid, joint positions, or a motion; and the tool directions.
+//!
+//! Plain data of a request, and the geometry of grid and tool directions. Frames: W world, T tool,
+//! whose z points along the tool. Not here: checks against a robot ([`super::checked_region`]).
 
 use std::f64::consts::FRAC_PI_2;
 

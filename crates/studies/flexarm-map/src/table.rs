@@ -1,9 +1,14 @@
 //! Rows of a map and their statistics: ranges, quantiles, best and worst.
+//!
+//! Not here: how rows are made ([`super::evaluate`]), how they are shown ([`super::page`]).
+
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::columns::{HEAD, MapColumn, cheapest};
+use super::columns::{HEAD, MapColumn, PLACE, cheapest};
+use super::region::Grid;
 
 /// Quantiles reported.
 pub const QUANTILES: [f64; 5] = [0.05, 0.25, 0.5, 0.75, 0.95];
@@ -52,6 +57,19 @@ impl MapTable {
         Some((cheapest(self.rows(), cost)?, cheapest(self.rows(), |row| -cost(row))?))
     }
 
+    /// Returns, per place of a grid, the cost of the best row by the column `by` and the value of another
+    /// column in it; infinite and NaN for places without a row.
+    pub(super) fn best_by_place(&self, by: usize, column: usize, grid: &Grid) -> Vec<(f64, f64)> {
+        let mut best = vec![(f64::INFINITY, f64::NAN); grid.places()];
+        for row in (0..self.rows()).map(|k| self.row(k)) {
+            let (slot, cost) = (&mut best[row[PLACE] as usize], self.cost(by, row[by]));
+            if cost < slot.0 {
+                *slot = (cost, row[column]);
+            }
+        }
+        best
+    }
+
     /// Returns the distributions of all quantities, in the order of the columns.
     pub(super) fn spreads(&self) -> Vec<(String, Spread)> {
         let quantities: Vec<usize> = (0..self.columns.len()).filter(|&k| self.columns[k].quantity).collect();
@@ -69,7 +87,7 @@ pub struct Spread {
     /// Mean.
     pub mean: f64,
     /// 5, 25, 50, 75 and 95 % quantiles, under the keys `0.05` to `0.95`.
-    pub quantiles: std::collections::BTreeMap<String, f64>,
+    pub quantiles: BTreeMap<String, f64>,
 }
 
 impl Spread {
@@ -110,7 +128,7 @@ pub struct MapPose {
     /// Value of the quantity by which the map compares.
     pub value: f64,
     /// Values of all quantities.
-    pub quantities: std::collections::BTreeMap<String, f64>,
+    pub quantities: BTreeMap<String, f64>,
 }
 
 impl MapPose {

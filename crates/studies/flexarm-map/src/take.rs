@@ -1,4 +1,7 @@
 //! Evaluation of the places of a map on all cores.
+//!
+//! Start at [`take`]. A thread takes a chunk of places, collects the poses of whole places, and
+//! evaluates them together; the rows are joined in the order of the places.
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -110,6 +113,7 @@ pub(super) fn take(
         }
         !stopped.load(Relaxed)
     };
+    // Blocks of places in order; the chunks of a block go to the threads.
     for first in (0..all).step_by(BLOCK) {
         let last = (first + BLOCK).min(all);
         let chunks: Vec<usize> = (first..last).step_by(chunk).collect();
@@ -169,6 +173,7 @@ impl<'a> Worker<'a> {
         Self { places, finder, evaluator, choice, branches, waiting, labels: Vec::new(), rows: Vec::new() }
     }
 
+    /// Evaluates the places from `from` to before `to`.
     fn chunk(&mut self, from: usize, to: usize, go_on: &dyn Fn() -> bool) -> Evaluation {
         let mut taken = Evaluation { done: to - from, ..Evaluation::default() };
         for place in from..to {

@@ -2,6 +2,9 @@
 //! link.
 //!
 //! Frames: L link; S section, x from the link's origin to the distal joint, y and z across.
+//!
+//! Start at [`propose`]. Not here: end points for files whose frames are elsewhere
+//! ([`super::ends`]).
 
 use flexarm_kinematics::{Joint, LinkInertia, Pose};
 use flexarm_urdf::{CrossSection, TriangleMesh, cross_section};
@@ -146,6 +149,7 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
         return Err("it has no readable geometry".to_owned().into());
     }
     let joint = &link.distal.name;
+    // Outlines along the line, which must be on or beside it.
     let cuts = Cuts::of(link.meshes, &from, &axis)?;
     let along = cuts.along(length);
     let aside = cuts.centroid(length).norm();
@@ -161,6 +165,7 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
             1e3 * aside
         )));
     }
+    // Boxes or circles with the second moments of the outlines, slender enough for a beam.
     let shape = if cuts.is_round(length) { Shape::Tube } else { Shape::Box };
     let turn = if shape == Shape::Box { cuts.principal_turn(length) } else { 0.0 };
     let outlines = cuts.outlines(turn, shape);
@@ -169,6 +174,7 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
         let [length, thickness] = [length, thickness].map(|x| 1e3 * x);
         return Err(format!("not slender: {length:.0} mm long, {thickness:.0} mm thick").into());
     }
+    // Wall with the mass of the link, and the uniform section with the same tip deflection.
     let (material, wall) = wall(&outlines, shape, inertia.mass)?;
     let mut section = equivalent(&outlines, shape, length, wall);
     section.material = material;
@@ -179,12 +185,14 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
         let taper = section.taper;
         return Err(format!("its width varies by a factor of {taper:.1} between the joints: not a beam").into());
     }
+    // Share of the mass that is in the beam.
     let density = MATERIALS.iter().find(|m| m.0 == material).map_or(2700.0, |m| m.1);
     let (whole, own) = (shell(&outlines, shape, wall), shell_between(&outlines, shape, length, wall));
     if own < OWN * whole {
         return Err(format!("only {:.0} % of its mass is between the joints", 100.0 * own / whole).into());
     }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
+    // Axes and offset of the section in link axes.
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
     section.y_axis = (R_LS * Vector3::y()).into();
     let c = cuts.centroid(length);
@@ -221,6 +229,7 @@ struct Outline {
 }
 
 impl Cuts {
+    /// Cuts the shapes across the line that starts at `from`, link axes (m).
     fn of(meshes: &[TriangleMesh], from: &Vector3<f64>, axis: &Vector3<f64>) -> Result<Self, NoSection> {
         let x = axis.normalize();
         let across = Vector3::ith(axis.abs().imin(), 1.0);
@@ -242,10 +251,12 @@ impl Cuts {
         Ok(Self { X_LS, sections: (0..CUTS).map(cut).collect() })
     }
 
+    /// Returns the cuts with an outline.
     fn found(&self) -> impl Iterator<Item = (f64, &CrossSection)> {
         self.sections.iter().filter_map(|(x, section)| Some((*x, section.as_ref()?)))
     }
 
+    /// Returns the outlines between the ends of the beam.
     fn within(&self, length: f64) -> impl Iterator<Item = (f64, &CrossSection)> {
         self.found().filter(move |(x, _)| (0.0..=length).contains(x))
     }
@@ -256,12 +267,14 @@ impl Cuts {
         (self.within(length).count() as f64 * step / length).min(1.0)
     }
 
+    /// Returns the fraction of the outlines that are open.
     fn open(&self) -> f64 {
         let (all, open) =
             self.found().fold((0.0, 0.0), |(n, k), (_, s)| (n + 1.0, k + f64::from(u8::from(!s.is_closed))));
         open / f64::max(all, 1.0)
     }
 
+    /// Returns the outline closest to a position (m).
     fn nearest(&self, x: f64) -> Option<&CrossSection> {
         self.found().min_by(|a, b| (a.0 - x).abs().total_cmp(&(b.0 - x).abs())).map(|(_, section)| section)
     }
@@ -273,6 +286,7 @@ impl Cuts {
         })
     }
 
+    /// Returns the mean centroid, in the axes y and z of S (m).
     fn centroid(&self, length: f64) -> Vector2<f64> {
         self.mean(length).1
     }
@@ -285,6 +299,9 @@ impl Cuts {
         if c.abs() < 0.02 * (a + b) { 0.0 } else { 0.5 * (2.0 * c).atan2(a - b) }
     }
 
+    /// Returns boxes or circles with the second moments of the outlines.
+    ///
+    /// * `turn`: angle from the axes of S to the principal axes (rad).
     fn outlines(&self, turn: f64, shape: Shape) -> Vec<Outline> {
         let R = Rotation2::new(turn);
         let step = self.sections[1].0 - self.sections[0].0;
@@ -349,6 +366,7 @@ fn outline_at(outlines: &[Outline], x: f64) -> [f64; 2] {
     }
 }
 
+/// Returns a mean over the beam, weighted for a force at its tip.
 fn weighted(outlines: &[Outline], length: f64, of: impl Fn(&Outline) -> f64) -> f64 {
     let value = |x: f64| {
         let [width, height] = outline_at(outlines, x);
@@ -408,6 +426,7 @@ fn wall(outlines: &[Outline], shape: Shape, mass: f64) -> Result<(&'static str, 
     .into())
 }
 
+/// Returns the reason why a wall is too thin.
 fn thin_wall(mass: f64, wall: f64, material: &str) -> NoSection {
     format!(
         "its {mass:.3} kg would be a wall of {:.2} mm of {material} around its outline: the mass does not match the \

@@ -1,5 +1,8 @@
 //! Choice of the joints that form the arm: from base to tool, which of them move, and which are
 //! held.
+//!
+//! Start at [`find`]. Without names from the user, the longest chain that is not a hand, a leg or a
+//! wheel is the arm. Not here: what the arm weighs and how it moves ([`super::draft`]).
 
 use std::collections::HashMap;
 
@@ -133,6 +136,7 @@ pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewErr
     if !mechanism.joints.iter().any(is_free) {
         return Err(no_movable_joint(mechanism));
     }
+    // Base and tool: requested, or the root and the end of the best chain.
     let root = tree.root().unwrap_or_default().to_owned();
     let known = |link: &String| {
         let links = || mechanism.links.iter().map(|l| l.name.as_str());
@@ -147,6 +151,7 @@ pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewErr
         Some(tool) => known(tool)?,
         None => choose_tool(&tree, &base, &mut choices)?,
     };
+    // The path between them, and the joints on it that move.
     let whole = tree.path(&tool);
     let path: Vec<usize> = match whole.iter().position(|&k| tree.joint(k).parent == base) {
         Some(first) => whole[first..].to_vec(),
@@ -170,6 +175,7 @@ pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewErr
         );
         return Err(NewError(message));
     }
+    // All other joints that could move are held, with the reason.
     let reason = |k: usize| {
         if path.contains(&k) {
             "not requested"
@@ -185,6 +191,7 @@ pub fn find(mechanism: &Mechanism, options: &NewOptions) -> Result<Chain, NewErr
     Ok(Chain { held: others.map(|k| (k, reason(k))).collect(), base, tool, path, joints, choices })
 }
 
+/// Returns the closest name as a question, or all names.
 fn did_you_mean<'n>(found: &str, what: &str, known: impl Iterator<Item = &'n str> + Clone) -> String {
     match closest(found, known.clone()) {
         Some(name) => format!("did you mean {name:?}?"),
@@ -192,6 +199,7 @@ fn did_you_mean<'n>(found: &str, what: &str, known: impl Iterator<Item = &'n str
     }
 }
 
+/// Returns the joints with these names, in the order of the description.
 fn named_joints(mechanism: &Mechanism, names: &[String]) -> Result<Vec<usize>, NewError> {
     let free = || mechanism.joints.iter().filter(|j| is_free(j)).map(|j| j.name.as_str());
     let place = |name: &String| {
@@ -227,6 +235,7 @@ struct Candidate<'a> {
     named: bool,
 }
 
+/// Returns the tool of the longest chain that is an arm; equal ones are named in `choices`.
 fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result<String, NewError> {
     let mechanism = tree.mechanism;
     let is_leaf = |link: &&str| tree.below(link).next().is_none();
@@ -240,6 +249,7 @@ fn choose_tool(tree: &Tree<'_>, base: &str, choices: &mut Vec<String>) -> Result
         if candidates.iter().any(|c| c.end == end) {
             continue;
         }
+        // Rank of the chain up to its last moving joint.
         let path = &path[..=last];
         let free = path.iter().filter(|&&k| is_free(tree.joint(k)));
         let word = |joint: &Joint| {

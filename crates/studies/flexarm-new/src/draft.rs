@@ -1,4 +1,8 @@
 //! Facts and assumptions about a robot, collected before anything is written.
+//!
+//! Start at [`Draft::of`]: description, chain of joints, payload, workspace, drives, motion, beams,
+//! each from what comes before it. Not here: whether a beam can be loaded, and the list of
+//! assumptions ([`super::settle`]).
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -8,11 +12,11 @@ use flexarm_settings::Setting;
 use flexarm_urdf::{Geometry, ReadOptions, TriangleMesh, UrdfError, UrdfRobot, Visual, read_urdf};
 use nalgebra::{DVector, Vector3};
 
-use super::assumption::Assumption;
 use super::beams::{self, BeamSection, NoSection};
 use super::chain::{self, Chain};
 use super::gears::{self, GearClass, Reducer};
 use super::loads::{self, Cube, Workspace};
+use super::report::Assumption;
 use super::sample::{self, Axis, SampleMotion};
 use super::{NewError, NewOptions};
 use flexarm_run::Error;
@@ -71,10 +75,16 @@ pub(crate) struct Draft {
 }
 
 impl Draft {
+    /// Reads a description and assumes what it lacks.
+    ///
+    /// # Errors
+    /// [`NewError`] for a payload that is not a mass, and for an arm without joints or mass; those of the
+    /// description.
     pub(crate) fn of(path: &Path, options: &NewOptions) -> Result<Self, Error> {
         if let Some(found) = options.payload_kg.filter(|kg| !(kg.is_finite() && *kg >= 0.0)) {
             return Err(NewError(format!("{} is {found}: expected a mass in kg, 0 for none", Setting::Payload)).into());
         }
+        // Description, and the joints that are the arm.
         let Description { urdf, waived, discarded } = Description::read(path, &options.urdf)?;
         let mechanism = &urdf.mechanism;
         let chain = chain::find(mechanism, options)?;
@@ -83,6 +93,7 @@ impl Draft {
             let loaded = loads::loaded(mechanism, &chain.tool, payload);
             Model::new(&loaded).map_err(|source| Error::Model { path: path.to_owned(), source: Box::new(source) })
         };
+        // An arm without mass has no loads.
         let bare = model(None)?;
         let moving_mass = mass_after(mechanism, &chain);
         if moving_mass <= 0.0 {
@@ -96,7 +107,8 @@ impl Draft {
             );
             return Err(NewError(message).into());
         }
-        let held = held_joints(mechanism, &chain);
+        // Payload, as given or guessed from the loads over the workspace.
+        let held = fixed_joints(mechanism, &chain);
         let ranges = ranges(&bare, mechanism, &chain, &held);
         let payload_known = options.payload_kg.is_some();
         let payload = match options.payload_kg {
@@ -105,6 +117,7 @@ impl Draft {
         };
         let payload = Cube::of(payload);
         let model = model((payload.mass > 0.0).then_some(payload))?;
+        // Loads with it, and what follows: drives, sample motion, sections of the links.
         let workspace = Workspace::of(&model, &ranges);
         let reach = reach(&model, &workspace, mechanism, &chain);
         let floor = loads::wrist_torque(payload.mass, moving_mass, reach);
@@ -211,12 +224,12 @@ fn mass_after(mechanism: &Mechanism, chain: &Chain) -> f64 {
 }
 
 /// Returns the joints that are not part of the arm: name, position and reason.
-fn held_joints(mechanism: &Mechanism, chain: &Chain) -> Vec<(String, f64, &'static str)> {
-    let held = |&(k, why): &(usize, &'static str)| {
+fn fixed_joints(mechanism: &Mechanism, chain: &Chain) -> Vec<(String, f64, &'static str)> {
+    let fixed = |&(k, why): &(usize, &'static str)| {
         let joint = &mechanism.joints[k];
         (joint.name.clone(), 0.0f64.clamp(joint.limits.lower, joint.limits.upper), why)
     };
-    chain.held.iter().map(held).collect()
+    chain.held.iter().map(fixed).collect()
 }
 
 /// Returns the range of each coordinate to be sampled; held ones have a single value.
@@ -229,6 +242,7 @@ fn ranges(model: &Model, mechanism: &Mechanism, chain: &Chain, held: &[(String, 
     model.coordinates().iter().map(|c| range(&c.joint)).collect()
 }
 
+/// Guesses the payload from gravity torques without it and with one kilogram (kg).
 fn guess(bare: &Model, with_one_kg: &Model, ranges: &[[f64; 2]], mass: f64) -> f64 {
     let (without, with) = (Workspace::of(bare, ranges), Workspace::of(with_one_kg, ranges));
     let joint = |&k: &usize| {
@@ -287,6 +301,7 @@ fn joints(
             };
         }
     }
+    // Rated torque and class of the reducers.
     for joint in &mut joints {
         joint.rated = match joint.effort_fault {
             None => joint.joint.limits.effort / gears::PEAK_OVER_RATED,
@@ -299,6 +314,7 @@ fn joints(
     joints
 }
 
+/// Returns a joint of the sample motion; `None` if the model has no such coordinate.
 fn axis(joint: &DraftJoint, model: &Model, ranges: &[[f64; 2]]) -> Option<Axis> {
     let k = model.coordinates().iter().position(|c| c.joint == joint.joint.name)?;
     let full = ranges[k];
@@ -321,6 +337,7 @@ fn links(urdf: &UrdfRobot, chain: &Chain) -> Vec<DraftLink> {
     let joint = |k: usize| &mechanism.joints[k];
     let first = chain.path.iter().position(|k| chain.joints.contains(k)).map_or(chain.path.len(), |p| p + 1);
     let arm: f64 = chain.path.iter().map(|&k| joint(k).X_PJ.translation.vector.norm()).sum();
+    // Every span between two joints of the path.
     let mut found = Vec::new();
     for &k in &chain.path[first.min(chain.path.len())..] {
         let distal = joint(k);

@@ -19,7 +19,6 @@
 //! the simulation that follows ([`flexarm_run::Arm::simulate`]).
 #![allow(non_snake_case, reason = "monogram notation: X_WL, K_S; see docs/references.md")]
 
-mod assumption;
 mod beams;
 mod chain;
 mod draft;
@@ -32,17 +31,14 @@ mod sample;
 mod settle;
 mod text;
 
-use flexarm_run::ExternalError;
 use std::path::Path;
 
+use flexarm_run::motion_report::motion_report;
+use flexarm_run::{Error, ExternalError, Motion, Robot};
 use flexarm_urdf::ReadOptions;
 
-use flexarm_run::motion_report::motion_report;
-use flexarm_run::{Error, Motion, Robot};
-
-pub use assumption::Assumption;
 pub use gears::Reducer;
-pub use report::{NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
+pub use report::{Assumption, NewDrive, NewHeld, NewJoint, NewLink, NewPayload, NewRobot};
 
 /// Parts that the tests of this crate reach; not part of the interface.
 #[doc(hidden)]
@@ -91,10 +87,12 @@ impl ExternalError for NewError {}
 /// [`NewError`] if there is no arm, no mass, or an unknown name; [`Error::Urdf`] for an invalid
 /// description; [`Error::Taken`] for existing files if `overwrite` is not set, [`Error::Write`].
 pub fn new_robot(urdf: &Path, folder: &Path, overwrite: bool, options: &NewOptions) -> Result<NewRobot, Error> {
+    // Facts and assumptions, the place of the description, beams that can be loaded.
     place::refuse_other_formats(urdf)?;
     let mut draft = draft::Draft::of(urdf, options)?;
     let placed = place::place(&draft, urdf, folder, options)?;
     settle::settle(&mut draft, &placed)?;
+    // All files or none.
     let robot_path = folder.join("robot.toml");
     let motion_path = folder.join("motion.toml");
     let mut files = placed.files.clone();
@@ -110,6 +108,7 @@ pub fn new_robot(urdf: &Path, folder: &Path, overwrite: bool, options: &NewOptio
     })?;
     flexarm_files::write_all(&files)?;
 
+    // The written files are read and checked as a user's would be.
     let robot = Robot::load(&robot_path)?;
     let report = motion_report(&motion_path, Some(&robot), &flexarm_run::MotionOptions::default(), &[], 500.0, false)?;
     let findings = flexarm_run::check(&robot_path, Some(&motion_path), &flexarm_run::LoadOptions::default());

@@ -1,4 +1,6 @@
 //! Loads of the joints: torques from gravity and acceleration, over the whole workspace.
+//!
+//! Start at [`Workspace::of`]. Efforts in N m or N, maxima over the sampled poses.
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, forward_kinematics, gravity_forces, mass_matrix,

@@ -1,7 +1,12 @@
 //! Location of the description: referenced in place if it is close to the new folder, else copied
 //! with its meshes.
+//!
+//! Start at [`place`]; [`refuse_other_formats`] comes first. Paths in the robot file are relative
+//! to its folder.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use super::draft::Draft;
@@ -33,6 +38,7 @@ pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
         let path = path.display();
         Err(NewError(format!("{path}: this is {what}, a URDF or xacro file is required; {help}")).into())
     };
+    // A folder, or no file at all.
     if path.is_dir() {
         let mut found: Vec<String> = std::fs::read_dir(path)
             .into_iter()
@@ -53,15 +59,10 @@ pub(crate) fn refuse_other_formats(path: &Path) -> Result<(), Error> {
         let what = "there is no such file; give a .urdf or .xacro file".into();
         return Err(Error::File { path: path.to_owned(), what });
     }
-    let head = {
-        use std::io::Read;
-        let mut head = Vec::new();
-        let file = std::fs::File::open(path).map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
-        file.take(4096)
-            .read_to_end(&mut head)
-            .map_err(|e| Error::File { path: path.to_owned(), what: e.to_string() })?;
-        head
-    };
+    let mut head = Vec::new();
+    let read = File::open(path).and_then(|file| file.take(4096).read_to_end(&mut head));
+    read.map_err(|error| Error::File { path: path.to_owned(), what: format!("cannot be read: {error}") })?;
+    // Formats by ending and by the first bytes.
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase()).unwrap_or_default();
     let text = String::from_utf8_lossy(&head);
     let root = |name: &str| text.contains(&format!("<{name} ")) || text.contains(&format!("<{name}>"));

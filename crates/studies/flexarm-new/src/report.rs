@@ -1,11 +1,12 @@
 //! Result of making a robot: SI units, angles in rad.
+//!
+//! The structures are the JSON of `--json`: their names are a contract. Start at [`of`].
 
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::assumption::Assumption;
-use super::draft::Draft;
+use super::draft::{Draft, DraftJoint, DraftLink};
 use super::gears::three_digits;
 use super::place::Placed;
 use flexarm_run::{Finding, MotionPeak, MotionReport, Summary};
@@ -60,6 +61,17 @@ pub struct NewRobot {
     pub files: Vec<String>,
     /// Summary of the first run, if there was one.
     pub summary: Option<Box<Summary>>,
+}
+
+/// An assumption about the robot.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Assumption {
+    /// Subject: a joint, a link, the payload.
+    pub about: String,
+    /// The assumption made.
+    pub text: String,
+    /// Way to replace it by a fact.
+    pub mend: String,
 }
 
 /// A joint of the arm; limits are null where there are none.
@@ -171,10 +183,14 @@ pub struct NewPayload {
     pub assumed: bool,
 }
 
+/// Returns a limit; `None` for an infinite one.
 fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+/// Returns the result of making a robot.
+///
+/// * `motion`, `findings`: of the written files, read again.
 pub(crate) fn of(
     draft: &Draft,
     placed: &Placed,
@@ -183,6 +199,7 @@ pub(crate) fn of(
     motion: MotionReport,
     findings: Vec<Finding>,
 ) -> NewRobot {
+    // Facts and assumptions of the draft, then the figures of the written files.
     let shown = |path: PathBuf| path.display().to_string();
     let joint = |k: &usize| &draft.urdf.mechanism.joints[*k];
     let mut chain = vec![draft.chain.base.clone()];
@@ -218,7 +235,7 @@ pub(crate) fn of(
     }
 }
 
-fn of_joint(joint: &super::draft::DraftJoint) -> NewJoint {
+fn of_joint(joint: &DraftJoint) -> NewJoint {
     let limits = &joint.joint.limits;
     NewJoint {
         name: joint.joint.name.clone(),
@@ -233,7 +250,7 @@ fn of_joint(joint: &super::draft::DraftJoint) -> NewJoint {
     }
 }
 
-fn of_link(link: &super::draft::DraftLink) -> NewLink {
+fn of_link(link: &DraftLink) -> NewLink {
     let (name, distal) = (link.link.clone(), link.distal.clone());
     let plain = NewLink { name, distal, length: link.length, mass: link.mass, ..NewLink::default() };
     match &link.section {
@@ -256,7 +273,7 @@ fn of_link(link: &super::draft::DraftLink) -> NewLink {
     }
 }
 
-fn of_drive(joint: &super::draft::DraftJoint) -> Option<NewDrive> {
+fn of_drive(joint: &DraftJoint) -> Option<NewDrive> {
     let gear = joint.gear.as_ref()?;
     Some(NewDrive {
         joint: joint.joint.name.clone(),

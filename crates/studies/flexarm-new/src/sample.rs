@@ -1,4 +1,7 @@
 //! Sample motion: from point to point through the workspace, within the limits of the joints.
+//!
+//! Start at [`sample_motion`]. Moves are quintic from rest to rest, in the order of the axes. Not
+//! here: which poses are sampled ([`super::loads`]), how the motion is written ([`super::text`]).
 
 use flexarm_kinematics::{Data, Joint, Model, State, inverse_dynamics};
 use nalgebra::DVector;
@@ -73,6 +76,7 @@ struct PoseConditions {
 }
 
 impl PoseConditions {
+    /// Whether a pose is high and far enough, and light enough for the drives.
     fn is_met(&self, pose: &Posed, axes: &[Axis]) -> bool {
         let strong = |axis: &Axis| !axis.effort.is_finite() || pose.weight[axis.k] <= WEIGHT * axis.effort;
         pose.lowest >= self.floor && pose.tool.xy().norm() >= self.radius && (!self.torque || axes.iter().all(strong))
@@ -82,6 +86,7 @@ impl PoseConditions {
 /// Returns rests with TCP positions far from each other, and paths between them that keep above the
 /// floor.
 pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis]) -> SampleMotion {
+    // Sampled poses, drawn into the ranges of the motion.
     let mut data = Data::new(model);
     let inner = |pose: &Posed| {
         let mut q = pose.q.clone();
@@ -93,6 +98,7 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
         q
     };
     let poses: Vec<Posed> = workspace.poses.iter().map(|p| posed(model, &mut data, inner(p))).collect();
+    // Conditions on the poses, from the best to the weakest that any arm meets.
     let reach = poses.iter().map(|p| p.tool.xy().norm()).fold(0.0, f64::max);
     let all_low = poses.iter().map(|p| p.lowest).fold(f64::INFINITY, f64::min);
     let still = still_height(model, &mut data, workspace);
@@ -111,6 +117,7 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
             break;
         }
     }
+    // Notes on what the motion does not show or keep.
     if turns_in_place(&poses) {
         let note = "no joint of the motion moves the tool, which is on their axes: it turns in place; choose another tcp or joint";
         motion.notes.push(note.into());
@@ -121,6 +128,7 @@ pub(crate) fn sample_motion(model: &Model, workspace: &Workspace, axes: &[Axis])
     if rests.is_empty() {
         rests.extend(poses.first().cloned());
     }
+    // Moves from rest to rest and back to the start.
     let start: Vec<f64> = axes.iter().map(|axis| rests[0].q[axis.k]).collect();
     motion.rests.push(Rest { at: start.clone(), duration: 0.0 });
     for pose in rests[1..].iter().chain(std::iter::once(&rests[0])) {

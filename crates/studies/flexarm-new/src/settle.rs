@@ -1,11 +1,13 @@
 //! Settles the beams of a draft, and lists its assumptions and the questions that they raise.
+//!
+//! [`settle`] drops beams that the reader of robot files refuses, then lists what remains assumed.
 
 use flexarm_run::{Description, Error, LoadOptions, RobotSource};
 use flexarm_settings::Setting;
 
-use super::assumption::{Assumption, assumption};
 use super::draft::{Draft, DraftJoint, DraftLink, placeholders};
 use super::place::Placed;
+use super::report::Assumption;
 use super::text;
 
 /// Tries each beam in the robot file to be written: one that cannot be used is left out, with the
@@ -31,7 +33,13 @@ pub(crate) fn settle(draft: &mut Draft, placed: &Placed) -> Result<(), Error> {
     Ok(())
 }
 
+fn assumption(about: &str, text: String, mend: &str) -> Assumption {
+    Assumption { about: about.to_owned(), text, mend: mend.to_owned() }
+}
+
+/// Lists the assumptions, those about the whole arm first.
 fn assumptions(draft: &Draft) -> Vec<Assumption> {
+    // Choice of the arm, inertias, masses, payload.
     let mut list = Vec::new();
     for choice in &draft.chain.choices {
         list.push(assumption("the arm", choice.clone(), &format!("choose another one with {} LINK", Setting::Tool)));
@@ -54,6 +62,7 @@ fn assumptions(draft: &Draft) -> Vec<Assumption> {
         );
         list.push(assumption("payload", text, &format!("{} KG, or payload in robot.toml", Setting::Payload)));
     }
+    // Joints, links, motion.
     draft.joints.iter().for_each(|joint| of_joint(joint, &mut list));
     for link in &draft.links {
         if let Ok(section) = &link.section {
@@ -99,6 +108,7 @@ fn of_joint(joint: &DraftJoint, list: &mut Vec<Assumption>) {
 
 /// Adds the assumptions about masses that are implausible for this arm.
 fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
+    // Estimated masses.
     let own: f64 = draft.urdf.mechanism.links.iter().filter_map(|l| l.inertia).map(|i| i.mass).sum();
     let which = match draft.discarded.is_empty() {
         true => "links without <inertial>",
@@ -124,6 +134,7 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
         );
         list.push(assumption("masses", text, "remove <inertial> from the description if its masses are unreliable"));
     }
+    // Masses of the description that are doubtful or missing.
     let alike = placeholders(&draft.urdf.mechanism);
     let mass = alike.first().and_then(|name| draft.urdf.mechanism.link(name)?.inertia).map_or(0.0, |i| i.mass);
     if !alike.is_empty() && draft.discarded.is_empty() {
@@ -149,7 +160,9 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
     }
 }
 
+/// Lists the questions for the manufacturer, or quantities to measure.
 fn questions(draft: &Draft) -> Vec<String> {
+    // What decides the stiffness, then loads and limits.
     let mut list = Vec::new();
     let turning: Vec<&str> = draft.joints.iter().filter(|j| j.gear.is_some()).map(|j| j.joint.name.as_str()).collect();
     if !turning.is_empty() {

@@ -1,4 +1,8 @@
 //! The files as text: `robot.toml`, `motion.toml`, `README.md`.
+//!
+//! [`robot_file`], [`motion_file`] and [`readme`] write what the draft contains. Every assumed
+//! value has a comment with its origin. Not here: the values ([`super::draft`]), the assumptions
+//! ([`super::settle`]).
 
 use std::fmt::Write;
 
@@ -25,10 +29,12 @@ fn float(value: f64, digits: i32) -> String {
     format!("{:?}", if value == 0.0 { 0.0 } else { value })
 }
 
+/// Formats a vector for TOML.
 fn vector(values: &[f64; 3], digits: i32) -> String {
     format!("[{}]", values.map(|x| float(x, digits)).join(", "))
 }
 
+/// Returns the sizes of a section as keys of the robot file (m).
 fn beam_keys(s: &BeamSection, wall: Option<f64>) -> String {
     match (s.section, wall) {
         ("tube", Some(wall)) => format!("outer_diameter = {}, wall = {}", float(s.width, 5), float(wall, 5)),
@@ -48,12 +54,13 @@ pub(crate) fn robot_file(draft: &Draft, placed: &Placed, beams: &[&DraftLink]) -
     let _ = efforts(&mut t, draft);
     let _ = masses(&mut t, draft);
     let _ = tool(&mut t, draft);
-    let _ = held(&mut t, draft);
+    let _ = fixed_joints(&mut t, draft);
     let _ = links(&mut t, draft, beams);
     let _ = drives(&mut t, draft);
     t
 }
 
+/// Writes name, description, motion and the waived inertias.
 fn head(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     writeln!(
         t,
@@ -120,6 +127,7 @@ fn tool(t: &mut String, draft: &Draft) -> std::fmt::Result {
         inline(&draft.chain.tool)
     )?;
     writeln!(t, "tcp = {{ link = {}, xyz = [0.0, 0.0, 0.0], rpy = [0.0, 0.0, 0.0] }}", quoted(&draft.chain.tool))?;
+    // The payload, or a comment with its format.
     let p = &draft.payload;
     if p.mass > 0.0 {
         let origin =
@@ -147,7 +155,7 @@ fn tool(t: &mut String, draft: &Draft) -> std::fmt::Result {
 }
 
 /// Writes the joints that are held.
-fn held(t: &mut String, draft: &Draft) -> std::fmt::Result {
+fn fixed_joints(t: &mut String, draft: &Draft) -> std::fmt::Result {
     if !draft.held.is_empty() {
         writeln!(t, "\n# Positions of the joints that are not part of the arm (rad, m).\n[hold]")?;
         for (joint, at, why) in &draft.held {
@@ -162,11 +170,11 @@ fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
     let of_arm = draft.joints.iter().filter(|j| j.effort_fault.is_some()).map(|j| &j.joint);
     let known = |effort: f64| of_arm.clone().any(|joint| joint.limits.effort == effort);
     let is_senseless = |effort: f64| effort <= 0.0 || effort > MAX_EFFORT || known(effort);
-    let held = draft.chain.held.iter().map(|&(k, _)| &draft.urdf.mechanism.joints[k]);
-    let held = held.filter(|joint| is_senseless(joint.limits.effort));
+    let others = draft.chain.held.iter().map(|&(k, _)| &draft.urdf.mechanism.joints[k]);
+    let others = others.filter(|joint| is_senseless(joint.limits.effort));
     let named: Vec<String> = of_arm
         .clone()
-        .chain(held)
+        .chain(others)
         .filter(|joint| joint.limits.effort.is_finite())
         .map(|joint| format!("{} = inf", quoted(&joint.name)))
         .collect();
@@ -177,6 +185,7 @@ fn efforts(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(t, "effort_limit = {{ {} }}", named.join(", "))
 }
 
+/// Writes the flexible links, and the reason why others are rigid.
 fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Result {
     writeln!(
         t,
@@ -185,6 +194,7 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
     )?;
     writeln!(t, "# mass. ASSUMED: the material, and all of the mass in the wall: an upper estimate of the stiffness.")?;
     for link in beams {
+        // A link without a usable section stays rigid; the notes say why.
         let Ok(s) = &link.section else { continue };
         section_notes(t, link, s)?;
         writeln!(t, "[[flexible_link]]\nlink = {}\ndistal = {}", quoted(&link.link), quoted(&link.distal))?;
@@ -249,6 +259,7 @@ fn section_notes(t: &mut String, link: &DraftLink, s: &BeamSection) -> std::fmt:
     Ok(())
 }
 
+/// Writes the reducers with the origin of their stiffness.
 fn drives(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(
         t,
@@ -258,6 +269,7 @@ fn drives(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(t, "# the range of the class. Damping is omitted: 3 % of critical.")?;
     for joint in &draft.joints {
         let name = &joint.joint.name;
+        // No class of reducers for the joint: it stays rigid.
         let Some(gear) = &joint.gear else {
             let why = if joint.joint.kind.slides() {
                 "it slides: the classes of reducers have no stiffness for prismatic joints"
@@ -290,7 +302,9 @@ pub(crate) fn motion_file(draft: &Draft) -> String {
     t
 }
 
+/// Writes the sample motion: header, joints and start, assumed limits, moves.
 fn write_motion(t: &mut String, draft: &Draft) -> std::fmt::Result {
+    // Joints of the motion, with their values in degrees and metres.
     let names: Vec<String> = draft.joints.iter().map(|j| quoted(&j.joint.name)).collect();
     let sliding: Vec<String> =
         draft.joints.iter().filter(|j| j.joint.kind.slides()).map(|j| quoted(&j.joint.name)).collect();
@@ -334,6 +348,7 @@ fn write_motion(t: &mut String, draft: &Draft) -> std::fmt::Result {
             writeln!(t, "{} = {{ velocity = {value} }}", quoted(&joint.joint.name))?;
         }
     }
+    // One move per rest, the last one back to the start.
     let last = rests.len() - 1;
     for (k, rest) in rests.iter().enumerate().skip(1) {
         let to = if k == last { "back to the start".to_owned() } else { format!("stop {k}") };
@@ -355,15 +370,18 @@ pub(crate) fn readme(draft: &Draft, placed: &Placed) -> String {
     t
 }
 
+/// Writes what was found, what is assumed, and what to ask for.
 fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Result {
     let joint = |k: &usize| &draft.urdf.mechanism.joints[*k];
     writeln!(t, "# {}\n\nMade by `flexarm new`; {}.\n", markdown(&draft.name), markdown(&placed.words))?;
+    // Commands that work in the folder.
     writeln!(
         t,
         "```sh\nflexarm compare .            # the arm against its rigid twin on motion.toml\n\
          flexarm check .              # errors and doubtful values"
     )?;
     writeln!(t, "flexarm motion motion.toml . # the motion against the limits\n```\n\n## Found\n")?;
+    // What is found in the description: chain, joints, links, mass, fixed joints.
     writeln!(
         t,
         "* The arm starts at {} and ends at the tool {}, at most {:.2} m from its first joint in the poses that \
@@ -393,6 +411,7 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
     Ok(())
 }
 
+/// Writes the table of the joints.
 fn joint_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(
         t,
@@ -413,6 +432,7 @@ fn joint_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(t, "\nTorques in N m (forces in N), with payload, maxima over the workspace.")
 }
 
+/// Writes the table of the links.
 fn link_table(t: &mut String, draft: &Draft) -> std::fmt::Result {
     writeln!(t, "\n| link | length, mm | mass, kg | section |\n| --- | --- | --- | --- |")?;
     for link in &draft.links {

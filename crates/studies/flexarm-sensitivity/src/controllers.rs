@@ -1,12 +1,15 @@
 //! Parameters of servo-controlled joints: friction and gains.
+//!
+//! Start at [`add_controllers`]. Only values that act have a slope: zeros are left out, since 1 % of
+//! zero is no change. Not here: the derivatives (`slopes.rs`), parameters of the robot file (`lib.rs`).
 
 use std::sync::Arc;
 
+use flexarm_run::{Arm, Error, Finding, Scenario};
 use flexarm_stepping::{Plant, ServoAxis, TorqueLimited};
 
 use super::slopes::{OfAxis, OfFriction};
 use super::{NamedParameter, RunParameter, RunSlopes};
-use flexarm_run::{Arm, Error, Finding, Scenario};
 
 /// Adds friction and gains of servo-controlled joints.
 pub(super) fn add_controllers(arm: &Arc<Arm>, scenario: &Scenario, all: &mut Vec<NamedParameter>) -> Result<(), Error> {

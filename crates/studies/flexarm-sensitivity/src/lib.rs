@@ -2,7 +2,7 @@
 //! runs, by differences on all cores.
 //!
 //! Start at [`sensitivity`], or at [`error_slopes`] for numbers only; [`pose_sensitivity`] is the
-//! analysis at a pose.
+//! analysis at a pose. Not here: the parameters and their effects on the arm (`flexarm-identify`).
 //!
 //! ```
 //! use flexarm_run::{Modelling, Robot};
@@ -28,16 +28,15 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use flexarm_files::{check_apart, check_free, write_all};
-use flexarm_identify::{Effect, Parameter, nominal, parameters, parameters_like};
-use flexarm_stepping::{ExactRun, StepError, StepperKind};
-use nalgebra::Vector3;
-use serde::Serialize;
-
 use flexarm_identify::parameters::{asks_for, fits};
+use flexarm_identify::{Effect, Parameter, nominal, parameters, parameters_like};
 use flexarm_run::caveat::{Use, once_each, warnings};
 use flexarm_run::prepare::{loaded, runnable};
 use flexarm_run::run::BeforeRun;
 use flexarm_run::{Arm, Error, Finding, Modelling, Robot, RunOptions, Scenario};
+use flexarm_stepping::{ExactRun, StepError, StepperKind};
+use nalgebra::Vector3;
+use serde::Serialize;
 
 use controllers::{add_controllers, limited};
 use slopes::Repeated;
@@ -133,6 +132,9 @@ struct NamedParameter {
 /// supported; its iterations are fully converged, so that the run is a smooth function of all
 /// inputs.
 ///
+/// * `parameters`: the derivatives are in their order.
+/// * `keep_samples`: whether to return errors and derivatives over time as well.
+///
 /// Cost: two runs for each parameter, each about ten ordinary ones, on all cores of the thread pool
 /// of `rayon`.
 ///
@@ -148,6 +150,7 @@ pub fn error_slopes(
     slopes_and_caveats(arm, &scenario.into(), options, parameters, keep_samples).map(|(found, _)| found)
 }
 
+/// As [`error_slopes`], with the caveats of the run.
 fn slopes_and_caveats(
     arm: &Arc<Arm>,
     scenario: &Scenario,
@@ -215,6 +218,7 @@ fn run_parameters(arm: &Arc<Arm>, scenario: &Scenario, asked: &[String]) -> Resu
     add_controllers(arm, scenario, &mut all)?;
     Ok(all)
 }
+
 /// Computes the sensitivity of the TCP error along a motion to all parameters of the robot:
 /// stiffness and damping of gearboxes and links, masses, the TCP position, the joints of the
 /// motion; friction and gains of servo-controlled joints.
@@ -227,6 +231,7 @@ pub fn sensitivity(
     scenario: impl Into<Scenario>,
     request: &SensitivityRequest,
 ) -> Result<Sensitivity, Error> {
+    // Derivatives of the run by the parameters that the request names.
     let scenario = scenario.into();
     check_apart(request.table.as_slice(), &[&robot.path, &robot.urdf_path, &scenario.motion.path])?;
     check_free(request.table.as_slice(), request.overwrite)?;
@@ -239,6 +244,7 @@ pub fn sensitivity(
     if let Some(path) = &request.table {
         write_all(&[(path.clone(), table(&named, &found))])?;
     }
+    // Effects of the reported changes, strongest first.
     let (position, rotation) = (&found.position, &found.rotation);
     let of = |(k, own): (usize, NamedParameter)| ParameterSensitivity {
         name: own.name,

@@ -1,16 +1,18 @@
 //! Sensitivity of the static TCP pose, the compliance and the natural frequencies at a pose.
+//!
+//! Start at [`pose_sensitivity`]. Closed-form derivatives, world axes, linear part first; the TCP
+//! moved in its own axes has a closed form too ([`of_tool`]). Not here: derivatives along a motion
+//! ([`super::slopes`]).
 
 use std::sync::Arc;
 
-use flexarm_identify::{Effect, compliance_slopes, frequency_slopes, nominal, tool_slopes};
+use flexarm_identify::{Effect, Parameter, compliance_slopes, frequency_slopes, nominal, tool_slopes};
 use flexarm_kinematics::{Pose, Wrench};
-use nalgebra::{Matrix3, Matrix6, Vector3};
-use serde::Serialize;
-
-use flexarm_identify::Parameter;
 use flexarm_run::caveat::{Use, warnings};
 use flexarm_run::inspect::joint_values;
 use flexarm_run::{Arm, Error, Finding, Modelling, Robot};
+use nalgebra::{Matrix6, Vector3};
+use serde::Serialize;
 
 use super::{change_of, chosen, numbers};
 
@@ -110,10 +112,9 @@ impl PoseParameterKind {
 /// ```
 fn of_tool(axis: usize, X_WT: &Pose, C: &Matrix6<f64>, modes: usize) -> PoseParameter {
     let a: Vector3<f64> = 1e-3 * (X_WT.rotation * Vector3::ith(axis, 1.0));
-    let mut moved = Matrix6::zeros();
-    let turned: Matrix3<f64> = -a.cross_matrix();
-    moved.fixed_view_mut::<3, 3>(0, 3).copy_from(&turned);
-    let half = moved * C;
+    let mut X = Matrix6::zeros();
+    X.fixed_view_mut::<3, 3>(0, 3).copy_from(&-a.cross_matrix());
+    let half = X * C;
     PoseParameter {
         name: PoseParameterKind::Tool(axis).name().to_owned(),
         unit: "m".to_owned(),
@@ -126,10 +127,12 @@ fn of_tool(axis: usize, X_WT: &Pose, C: &Matrix6<f64>, modes: usize) -> PosePara
     }
 }
 
+/// Returns a scaled matrix row after row.
 fn rows(C: &Matrix6<f64>, scale: f64) -> [[f64; 6]; 6] {
     std::array::from_fn(|i| std::array::from_fn(|j| scale * C[(i, j)]))
 }
 
+/// Computes the sensitivities to the requested parameters at a pose.
 fn slopes(
     robot: &Robot,
     arm: &Arc<Arm>,
@@ -137,6 +140,7 @@ fn slopes(
     at: Vec<f64>,
     asked: Vec<PoseParameterKind>,
 ) -> Result<PoseSensitivity, Error> {
+    // Derivatives by the parameters of the arm, one solution of the pose for all of them.
     let explained = |error| arm.explained(error);
     let none = Wrench::zeros();
     let mut point = arm.operating_point()?;
@@ -163,6 +167,7 @@ fn slopes(
             value: parameter.initial,
         }
     };
+    // The TCP moved in its own axes.
     let C = point.compliance();
     let modes = frequencies.hz.len();
     let of_tools = asked.iter().filter_map(|asked| match asked {

@@ -10,6 +10,9 @@
 //! errors are below 1e-6 down to ζ = 0.005. Dampers, friction and gains of servos change amplitudes:
 //! their third derivative is about the first, and both are small, so that rounding asks for the
 //! longer step [`OF_AMPLITUDE`].
+//!
+//! Start at [`Repeated::slopes`]. Errors are displacement and rotation vector, world axes. Not here:
+//! derivatives at a pose, which are in closed form ([`super::pose`]).
 
 use std::sync::Arc;
 
@@ -104,6 +107,7 @@ impl ErrorSlopes {
     }
 }
 
+/// Returns the displacement (`first` 0) or the rotation (3) of an error.
 fn part(of: &[f64; 6], first: usize) -> Vector3<f64> {
     Vector3::new(of[first], of[first + 1], of[first + 2])
 }
@@ -142,6 +146,7 @@ pub(super) struct Repeated<'a> {
 impl Repeated<'_> {
     /// Computes the error and its derivatives; `keep_samples`: also over time.
     pub(super) fn slopes(&self, parameters: &[RunParameter], keep_samples: bool) -> Result<RunSlopes, Error> {
+        // The run itself, then two runs per parameter, a step to each side.
         let found = self.errors(None)?;
         let (mut position, mut rotation) = (ErrorSlopes::of(&found, 0), ErrorSlopes::of(&found, 3));
         let mut kept = Vec::new();
@@ -189,6 +194,7 @@ impl Repeated<'_> {
 
     /// Runs the arm with one parameter changed; its controllers know the change.
     fn errors(&self, change: Option<(&RunParameter, f64)>) -> Result<ToolErrors, Error> {
+        // Changes of the arm, the motion and the tool come before the plant is built from them.
         let mut arm = self.arm.clone();
         let (mut robot, mut springs) = (self.arm.robot().clone(), arm.springs.clone());
         let (mut motion, mut run) = (self.scenario.motion.prescribed(), self.run.clone());
@@ -209,6 +215,7 @@ impl Repeated<'_> {
             Some((RunParameter::Tool(along), x)) => run.tool.X_BF *= Pose::from(along * x),
             _ => {}
         }
+        // Friction and gains are changed in the plant.
         let explained = |error| self.arm.explained(error);
         let mut plant = arm.plant_with(springs, motion).map_err(explained)?;
         match change {

@@ -2,14 +2,15 @@
 //!
 //! Parameters with listed values form a full grid, in which the last one changes fastest;
 //! parameters of the same `linked` group vary together. Parameters with a distribution are sampled
-//! jointly, and every point of the grid uses the same samples.
+//! jointly, and every point of the grid uses the same samples. Not here: distributions and sampling
+//! methods ([`crate::statistics`]), what a value changes ([`super::workshop`]).
 
-use crate::statistics::{Sample, grid_levels};
+use flexarm_run::RobotFileError;
 
 use super::file::{ParameterEntry, Role, StudyFile, Values};
 use super::metric::{Formula, Vocabulary};
 use super::value::ParameterValue;
-use flexarm_run::RobotFileError;
+use crate::statistics::{Sample, grid_levels};
 
 /// Column of the caveats of each run.
 pub(super) const CAVEATS: &str = "caveats";
@@ -73,6 +74,7 @@ impl Design {
     /// runs or random parameters, duplicate names.
     pub(super) fn new(columns: Vec<Column>, file: &StudyFile) -> Result<Self, RobotFileError> {
         let fail = |place: &RobotFileError, message: String| RobotFileError { message, ..place.clone() };
+        // Names are those of columns in the table of runs.
         for (k, column) in columns.iter().enumerate() {
             let taken = columns[..k].iter().any(|other| other.name == column.name);
             if taken || ["run", "status", "reason", CAVEATS].contains(&column.name.as_str()) {
@@ -81,6 +83,7 @@ impl Design {
                 return Err(fail(&column.place, message));
             }
         }
+        // Directions of the grid: one per listed parameter or linked group, all of one size.
         let (mut sizes, mut directions, mut drawn) = (Vec::new(), Vec::<Vec<usize>>::new(), Vec::new());
         for (k, column) in columns.iter().enumerate() {
             let levels = match &column.values {
@@ -110,6 +113,7 @@ impl Design {
                 }
             }
         }
+        // Expressions, the sample, and the number of runs: grid points times samples.
         let derived = derived(&columns)?;
         let sample = Sample::new(file.method, drawn.len(), file.count, file.seed).ok_or_else(|| {
             let most = file.method.most_dimensions();

@@ -1,4 +1,7 @@
 //! Errors of studies.
+//!
+//! `SweepError::Run` has messages of single runs; everything about folders and shards has its
+//! variant.
 
 use flexarm_run::ExternalError;
 use std::path::PathBuf;

@@ -1,19 +1,22 @@
 //! File of a study (`docs/sweep.md`): varied parameters, sampling, and metrics. Checks only what
 //! does not need the robot.
+//!
+//! Start at [`read`]. Every entry keeps its place in the file: paths, metrics and options are
+//! checked later against the robot ([`super::workshop`]), with the same line and column.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use crate::statistics::{Distribution, SampleMethod};
-use flexarm_files::read_text;
+use flexarm_files::{NumberTable, read_text};
+use flexarm_run::robot_file::Source;
+use flexarm_run::toml_file::{parsed, word};
+use flexarm_run::{Error, RobotFileError};
 use serde::{Deserialize, Serialize};
 use toml::Spanned;
 
 use super::direction::Better;
 use super::value::ParameterValue;
-use flexarm_run::robot_file::Source;
-use flexarm_run::toml_file::parsed;
-use flexarm_run::{Error, RobotFileError};
+use crate::statistics::{Distribution, SampleMethod};
 
 /// Contents of the file as written.
 #[derive(Debug, Deserialize)]
@@ -162,6 +165,7 @@ pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
     let text = read_text(path)?;
     let source = Source::new(path, &text, "study");
     let file: StudyToml = parsed(&text, &source, &[], |file: &StudyToml| &file.format)?;
+    // Parameters: entries and the columns of a table of runs.
     let placed = |text: &Spanned<String>| Placed { text: text.get_ref().clone(), place: source.error(text.span(), "") };
     let folder = path.parent().unwrap_or(Path::new("."));
     let mut parameters =
@@ -171,6 +175,7 @@ pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
     }
     let drawn = parameters.iter().any(|p| matches!(p.values, Values::Spread(_) | Values::Choice(_)));
     let (method, count, seed, sample_place) = sample(file.sample.as_ref(), drawn, &source)?;
+    // What is checked against the robot later keeps its place in the file.
     let options = file.options.iter().map(|(key, value)| option(key, value, &source)).collect::<Result<_, _>>()?;
     let reduce =
         file.reduce.iter().map(|(link, job)| (link.clone(), folder.join(job.get_ref()), source.error(job.span(), "")));
@@ -196,6 +201,7 @@ pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
     })
 }
 
+/// Reads the preferred direction of a metric.
 fn better(
     name: &str,
     word: &Spanned<String>,
@@ -209,6 +215,7 @@ fn better(
     }
 }
 
+/// Reads an option of the runs.
 fn option(
     key: &str,
     value: &Spanned<toml::Value>,
@@ -225,6 +232,9 @@ fn option(
     }
 }
 
+/// Reads method, count and seed of the sample.
+///
+/// * `drawn`: whether a parameter has a distribution; only then there is a sample.
 fn sample(
     entry: Option<&Spanned<SampleToml>>,
     drawn: bool,
@@ -257,6 +267,7 @@ fn sample(
     Ok((method, count, sample.seed, source.error(entry.span(), "")))
 }
 
+/// Returns a whole number from `least` to [`MAX_VALUES`].
 fn count(value: &Spanned<i64>, what: &str, least: i64, source: &Source) -> Result<usize, RobotFileError> {
     match *value.get_ref() {
         n if (least..=MAX_VALUES).contains(&n) => Ok(n as usize),
@@ -270,7 +281,9 @@ fn count(value: &Spanned<i64>, what: &str, least: i64, source: &Source) -> Resul
 /// Keys of a robot file that only name things.
 const LABELS: [&str; 3] = ["name", "format", "urdf"];
 
+/// Reads a parameter.
 fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<ParameterEntry, RobotFileError> {
+    // Paths, which must not name labels.
     let own = entry.get_ref();
     let fail = |message: String| source.error(entry.span(), message);
     let paths: Vec<String> = own.path.iter().chain(&own.paths).map(|path| path.get_ref().clone()).collect();
@@ -283,16 +296,11 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
             "{label:?} is a label that no result depends on; vary a number of the robot or the run"
         )));
     }
-    let role = match own.role.as_ref().map(|role| role.get_ref().as_str()) {
-        None | Some("value") => Role::Value,
-        Some("factor") => Role::Factor,
-        Some("offset") => Role::Offset,
-        Some(other) => {
-            return Err(fail(format!("as = {other:?} is not known; use \"value\", \"factor\" or \"offset\"")));
-        }
-    };
+    // What the values do to those in the files, and which values there are.
+    let roles = [("value", Role::Value), ("factor", Role::Factor), ("offset", Role::Offset)];
+    let role = word(source, "as", &own.role, &roles)?.1;
     let values = values(own, source, &fail)?;
-    let Placed { place, .. } = Placed { text: String::new(), place: source.error(entry.span(), "") };
+    let place = source.error(entry.span(), "");
     if own.each && own.name.is_some() {
         return Err(fail("each = true creates several parameters, named by their paths: remove name".into()));
     }
@@ -313,6 +321,7 @@ fn values(
     fail: &dyn Fn(String) -> RobotFileError,
 ) -> Result<Values, RobotFileError> {
     const ONE: &str = "give exactly one of values = [...], from and to, distribution = \"...\" or expression = \"...\"";
+    // Exactly one of four ways to give the values.
     let has_range = own.from.is_some() || own.to.is_some() || own.count.is_some();
     if let Some(expression) = &own.expression {
         return match own.values.is_none() && !has_range && own.distribution.is_none() {
@@ -354,11 +363,7 @@ fn range(
     let (Some(from), Some(to)) = (own.from, own.to) else {
         return Err(fail("a range needs from = ... and to = ...".into()));
     };
-    let logarithmic = match own.spacing.as_ref().map(|word| word.get_ref().as_str()) {
-        None | Some("linear") => false,
-        Some("log") => true,
-        Some(other) => return Err(fail(format!("spacing = {other:?} is not known; use \"linear\" or \"log\""))),
-    };
+    let logarithmic = word(source, "spacing", &own.spacing, &[("linear", false), ("log", true)])?.1;
     if !(from.is_finite() && to.is_finite()) || logarithmic && !(from > 0.0 && to > 0.0) {
         let expected = if logarithmic { "positive numbers for spacing = \"log\"" } else { "finite numbers" };
         return Err(fail(format!("from = {from}, to = {to}: expected {expected}")));
@@ -366,6 +371,7 @@ fn range(
     if from == to {
         return Err(fail(format!("from and to are {from}, so that nothing is varied; give different ones")));
     }
+    // Equal differences or ratios; the last value is exactly the end.
     let steps = match &own.count {
         Some(steps) => count(steps, "count", 1, source)?,
         None => USUAL_STEPS,
@@ -381,6 +387,7 @@ fn range(
     Ok(Values::Levels((0..steps).map(|k| ParameterValue::Number(at(k))).collect()))
 }
 
+/// Returns the keys of a distribution.
 fn keys_of_distribution(
     word: &str,
     fail: &dyn Fn(String) -> RobotFileError,
@@ -398,6 +405,7 @@ fn keys_of_distribution(
     }
 }
 
+/// Reads a distribution: all of its keys and no others, in the order low, mode, high.
 fn distribution(
     own: &ParameterToml,
     word: &str,
@@ -416,6 +424,7 @@ fn distribution(
     if let Some((key, _)) = numbers.iter().find(|(key, value)| value.is_some() && !taken.contains(key)) {
         return Err(fail(format!("distribution = {word:?} has no key {key}; its keys are {}", taken.join(", "))));
     }
+    // Checks of single numbers.
     let number = |key: &str| match numbers.iter().find(|(known, _)| *known == key) {
         Some((_, Some(x))) if x.is_finite() => Ok(*x),
         Some((_, Some(x))) => Err(fail(format!("{key} = {x}: expected a finite number"))),
@@ -456,7 +465,7 @@ fn distribution(
 
 /// Reads a table of runs: a column for each parameter, named by its path, a row for each run.
 fn table_of_runs(path: &Path, place: &RobotFileError) -> Result<Vec<ParameterEntry>, Error> {
-    let table = flexarm_files::NumberTable::read(path)?;
+    let table = NumberTable::read(path)?;
     if table.rows.is_empty() {
         return Err(table.error(None, "the table has no rows: expected one for each run").into());
     }

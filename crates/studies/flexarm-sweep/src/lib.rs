@@ -146,6 +146,7 @@ impl Sweep {
     /// [`Error::RobotFile`] with line and column of an error in the study: invalid paths, unknown
     /// metrics, missing files; errors of the robot.
     pub fn load(path: &Path, finders: &Finders) -> Result<Self, Error> {
+        // Files, then the parameters against them, then the metrics against a summary of the robot.
         let file = file::read(path)?;
         let mut workshop = Workshop::new(&file, finders)?;
         let columns = columns(&file, &workshop)?;
@@ -165,13 +166,14 @@ impl Sweep {
                 .map(move |text| (text.to_owned(), place.clone()))
                 .collect::<Vec<_>>()
         });
+        // A metric may use those before it.
         let asked = file.metrics.iter().map(|metric| (metric.text.clone(), metric.place.clone()));
         for (text, place) in usual.into_iter().flatten().chain(asked) {
             let known = Vocabulary { parameters: &parameters, metrics: &metrics, summary: &summary };
             let fail = |error: MetricError| RobotFileError { message: error.to_string(), ..place };
             let mut metric = Metric::parse(&text, &known).map_err(fail)?;
-            let said = file.better.iter().find(|(name, ..)| *name == metric.name);
-            metric.better = said.map(|(_, better, _)| *better).or(metric.better);
+            let given = file.better.iter().find(|(name, ..)| *name == metric.name);
+            metric.better = given.map(|(_, better, _)| *better).or(metric.better);
             metrics.push(metric);
         }
         check_names(&file, &metrics)?;
@@ -294,6 +296,7 @@ impl Sweep {
         let (sender, receiver) = channel();
         let mut done = 0;
         let mut failed = None;
+        // Threads take windows of runs; this thread keeps the results and asks whether to go on.
         std::thread::scope(|scope| {
             for _ in 0..threads {
                 let (sender, stop, next) = (sender.clone(), &stop, &next);
@@ -345,6 +348,7 @@ impl Sweep {
         Ok(path)
     }
 
+    /// Returns the description that identifies this study and its files.
     fn manifest(&self) -> Manifest {
         let mut inputs = vec![(
             self.file.path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
@@ -389,6 +393,7 @@ pub fn merge(
     let stopwatch = Stopwatch::start();
     let manifest = study.manifest();
     let mut collected = Collected::default();
+    // All folders must be of this study; together they must have all runs.
     let mut first: Option<&PathBuf> = None;
     for folder in folders {
         let known = known_manifest(folder)?.ok_or_else(|| SweepError::NoStudy { folder: folder.clone() })?;
@@ -460,6 +465,7 @@ fn columns(file: &StudyFile, workshop: &Workshop) -> Result<Vec<Column>, RobotFi
     Ok(columns)
 }
 
+/// Returns the names of the numeric parameters; `None` for others.
 fn parameter_names(design: &Design) -> Vec<Option<String>> {
     design.columns.iter().map(|column| column.is_numeric().then(|| column.name.clone())).collect()
 }
@@ -467,6 +473,7 @@ fn parameter_names(design: &Design) -> Vec<Option<String>> {
 /// Returns an example of a summary with all names that a run of the robot can have.
 fn skeleton(robot: &Robot, arm: &Arm) -> Summary {
     let links = arm.spans.iter().map(|span| LinkFigures { name: span.link.clone(), ..LinkFigures::default() });
+    // Links, and stresses where the robot file asks for them, all with example numbers.
     let stressed = robot.flexible_links.iter().filter(|link| link.stress.is_some());
     let place = StressPlaceFigures { of_yield: Some(0.0), damage: Some(0.0), ..StressPlaceFigures::default() };
     let stress = stressed.map(|link| {

@@ -1,5 +1,8 @@
 //! Metrics of a run: numbers of its summary by their path in the JSON, parameters, and expressions
 //! of both.
+//!
+//! Start at [`Metric::parse`] and [`values`]. A path in an expression becomes a variable of the
+//! parser's expression. Not here: which direction is better ([`super::direction`]).
 
 use exmex::{Express, FlatEx, FloatOpsFactory, MakeOperators};
 use serde_json::Value;
@@ -300,6 +303,7 @@ fn goes_on(letters: &[char], k: usize) -> bool {
     }
 }
 
+/// Returns what a name in an expression stands for.
 fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, MetricError> {
     if let Some(column) = known.parameters.iter().position(|name| name.as_deref() == Some(word)) {
         return Ok(Variable::Parameter(column));
@@ -307,6 +311,7 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, MetricError>
     if let Some(number) = known.metrics.iter().position(|metric| metric.name == word) {
         return Ok(Variable::Metric(number));
     }
+    // A number of the summary, by its path; those of the machine are no results.
     let path: Vec<String> = word.replace('[', ".").replace(']', "").split('.').map(str::to_owned).collect();
     if path.len() == 1 && OF_THE_MACHINE.contains(&word) {
         let why = "depends on the machine and its load: it cannot be a metric of a study";
@@ -334,6 +339,7 @@ fn variable(word: &str, known: &Vocabulary<'_>) -> Result<Variable, MetricError>
     }
 }
 
+/// Returns the number at a path, if it is available without the full summary.
 fn quick(path: &[String]) -> Option<Quick> {
     let words: Vec<&str> = path.iter().map(String::as_str).collect();
     Some(match words[..] {

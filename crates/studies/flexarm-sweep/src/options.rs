@@ -1,4 +1,6 @@
 //! Options of the runs of a study, with the names of `flexarm compare`, `_` in place of `-`.
+//!
+//! A key of `flexarm compare` that a study may set or vary has its case in `StudyOptions::set`.
 
 use flexarm_settings::Words;
 use flexarm_stepping::{STEPPERS, Start, StepperEntry, StepperOptions};

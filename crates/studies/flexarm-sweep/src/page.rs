@@ -90,6 +90,7 @@ impl Sweep {
             if all == 0 {
                 continue;
             }
+            // Those with an effect, then those that chance may explain.
             let name = markup(&metric.name);
             let _ = match ranking.matter.is_empty() {
                 true => write!(out, "<p>{name}: no parameter has a significant effect."),
@@ -114,12 +115,14 @@ impl Sweep {
         headed("Influential parameters, strongest first", out)
     }
 
+    /// Draws a heat map per metric over its two strongest parameters; a cell is the mean of its runs.
     fn heat_maps(&self, columns: &Columns, rankings: &[Ranking]) -> String {
         let mut out = String::new();
         let mut axes = Axes::default();
         for (k, (metric, ranking)) in self.metrics.iter().zip(rankings).enumerate() {
             let Some((a, b)) = axes.pair(&ranking.matter) else { continue };
             let (Some(x), Some(y)) = (self.shown_values(a, columns), self.shown_values(b, columns)) else { continue };
+            // Sum and number of the runs in each cell.
             let ((x_names, x_cells), (y_names, y_cells)) = (cells(&x), cells(&y));
             let mut sums = vec![(0.0, 0usize); x_names.len() * y_names.len()];
             for (row, value) in columns.metrics[k].iter().enumerate().filter(|(_, value)| value.is_finite()) {
@@ -147,6 +150,7 @@ impl Sweep {
         headed("Heat maps of the influential parameters", out)
     }
 
+    /// Draws the main effects of the strongest parameters, a row per metric.
     fn main_effects(&self, columns: &Columns, rankings: &[Ranking]) -> String {
         let labels: Vec<String> = (0..self.design.columns.len()).map(|p| self.shown(p).0).collect();
         let mut rows = Vec::new();
@@ -165,10 +169,12 @@ impl Sweep {
         headed("Main effects (means with standard errors, strongest first)", picture)
     }
 
+    /// Draws the Pareto front with some of its runs.
     fn pareto_plot(&self, summary: &SweepSummary, columns: &Columns) -> String {
         let Some(pareto) = &summary.pareto else { return String::new() };
         let place = |name: &String| self.metrics.iter().position(|metric| metric.name == *name);
         let (Some(a), Some(b)) = (place(&pareto.metrics[0]), place(&pareto.metrics[1])) else { return String::new() };
+        // All runs, thinned, with the front and the best run.
         let every = columns.runs.len().div_ceil(MAX_POINTS).max(1);
         let all = columns.metrics[a].iter().zip(&columns.metrics[b]).step_by(every);
         let points: Vec<[f64; 2]> = all.map(|(x, y)| [*x, *y]).collect();
@@ -185,6 +191,7 @@ impl Sweep {
             markup(&pareto.metrics[0]),
             markup(&pareto.metrics[1])
         );
+        // A dozen runs of the front, and what it assumes.
         let every = pareto.runs.len().div_ceil(12).max(1);
         for run in pareto.runs.iter().step_by(every) {
             let _ = writeln!(
@@ -207,6 +214,7 @@ impl Sweep {
         headed("Pareto front: no other run is better in both", out)
     }
 
+    /// Returns the values of the best run, and the command that repeats it.
     fn best_run(&self, summary: &SweepSummary) -> String {
         let Some(best) = &summary.best else { return String::new() };
         let mut out = format!(
@@ -238,6 +246,7 @@ impl Sweep {
         out
     }
 
+    /// Draws the scatter matrix of strongest parameters and first metrics.
     fn matrix(&self, columns: &Columns, ranking: Option<&Ranking>) -> String {
         let every = columns.runs.len().div_ceil(MAX_IN_MATRIX).max(1);
         let thinned = |values: &[f64]| -> Vec<f64> { values.iter().copied().step_by(every).collect() };
@@ -304,6 +313,7 @@ fn cells(values: &[f64]) -> (Vec<String>, Vec<Option<usize>>) {
     ((0..BINS).map(|k| rounded(low + step * (k as f64 + 0.5))).collect(), values.iter().map(place).collect())
 }
 
+/// Returns the table of the metrics.
 fn figures(summary: &SweepSummary) -> String {
     let mut out = String::from(
         "<h2>Results</h2>\n<table><tr><th>metric</th><th>runs</th><th>minimum</th><th>5 %</th><th>median</th>\
@@ -329,6 +339,7 @@ fn figures(summary: &SweepSummary) -> String {
     out + "</table>\n"
 }
 
+/// Draws the Sobol indices of each metric.
 fn sensitivities(summary: &SweepSummary) -> String {
     let mut out = String::new();
     for metric in summary.metrics.iter().filter(|metric| !metric.sobol.is_empty()) {

@@ -1,4 +1,7 @@
 //! Files with which a single run of a study can be repeated.
+//!
+//! The robot file moves to another folder with its relative paths; unchanged files are named where
+//! they are.
 
 use std::path::{Path, PathBuf};
 

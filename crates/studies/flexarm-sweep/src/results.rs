@@ -1,4 +1,7 @@
 //! Results of a study: figures of its metrics, failures, the best run.
+//!
+//! The structures are the JSON of `--json`: their names are a contract. Start at `Sweep::summary`.
+//! Not here: which parameters matter ([`super::ranking`]), the statistics ([`crate::statistics`]).
 
 use std::collections::BTreeMap;
 
@@ -227,6 +230,7 @@ impl Sweep {
         named.unwrap_or(0)
     }
 
+    /// Returns the run with the best value of the goal.
     fn best(&self, answers: &[(&Answer, Vec<ParameterValue>)], columns: &Columns) -> Option<BestRun> {
         let goal = self.goal();
         let values = columns.metrics.get(goal)?;
@@ -257,6 +261,7 @@ impl Sweep {
         self.metrics[metric].better.unwrap_or(Better::Lower)
     }
 
+    /// Returns the Pareto front of the two metrics of the study, by default the first two.
     fn pareto(&self, columns: &Columns) -> Option<ParetoFigures> {
         let place = |name: &String| self.metrics.iter().position(|metric| metric.name == *name);
         let (a, b) = match &self.file.pareto {
@@ -334,6 +339,7 @@ impl Sweep {
     }
 }
 
+/// Counts the failed runs by reason.
 fn failures(answers: &[(&Answer, Vec<ParameterValue>)]) -> Vec<FailureFigures> {
     let mut found: Vec<FailureFigures> = Vec::new();
     let mut places: BTreeMap<&str, usize> = BTreeMap::new();

@@ -1,4 +1,7 @@
 //! Caveats of the runs of a study, stored with each result, and merged over all runs.
+//!
+//! Start at [`figures`], the merge. Caveats are equal in kind and place, not in their numbers: the
+//! worst number represents them all. Not here: the caveats themselves (`flexarm_run::caveat`).
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;

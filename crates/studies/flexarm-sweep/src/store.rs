@@ -194,6 +194,7 @@ impl Collected {
             }
             other => other,
         })?;
+        // A part of another study, or without a column of this one, is refused.
         let print = table.texts.iter().find(|(key, _)| key == "flexarm.fingerprint").map(|(_, print)| print.as_str());
         if print != Some(&manifest.fingerprint) {
             return Err(broken("belongs to another study; remove it from the folder".into()).into());
@@ -215,6 +216,7 @@ impl Collected {
             Some(DataValues::Text(texts)) => texts.as_slice(),
             _ => return Err(broken(format!("has no column {CAVEATS:?}")).into()),
         };
+        // Row after row: a reason, or the metrics.
         self.files.push(path.to_owned());
         let file = self.files.len() - 1;
         for (row, run) in runs.iter().enumerate() {
@@ -236,6 +238,7 @@ impl Collected {
         if missing == 0 {
             return None;
         }
+        // By shard where the folder has shards, else by number.
         let mut which = String::new();
         if let Some(of) = self.shards {
             let (mut lacking, mut all) = (vec![0usize; of], vec![0usize; of]);
@@ -289,13 +292,18 @@ fn read_journal(path: &Path, manifest: &Manifest) -> Result<(Vec<Answer>, u64), 
         if line.last() != Some(&b'\n') {
             break; // truncated while being written
         }
-        let broken = || SweepError::Broken {
+        let broken = |found: String| SweepError::Broken {
             place: Place::of_file(path.display()).line(answers.len() + 1),
-            what: "this is not a valid result; remove the line, or remove the file to repeat its runs".into(),
+            what: format!(
+                "this is not a valid result ({found}); remove the line, or remove the file to repeat its runs"
+            ),
         };
-        let Line(run, reason, metrics, stored) = serde_json::from_slice(line).map_err(|_| broken())?;
-        if run >= manifest.runs || reason.is_none() && metrics.len() != manifest.metrics.len() {
-            return Err(broken().into());
+        let Line(run, reason, metrics, stored) =
+            serde_json::from_slice(line).map_err(|error| broken(error.to_string()))?;
+        let (runs, expected) = (manifest.runs, manifest.metrics.len());
+        if run >= runs || reason.is_none() && metrics.len() != expected {
+            let found = format!("run {run} of {runs} with {} metrics, expected {expected}", metrics.len());
+            return Err(broken(found).into());
         }
         let numbers = metrics.into_iter().map(|x| x.unwrap_or(f64::NAN)).collect();
         answers.push(Answer { run, result: reason.map_or(Ok(numbers), Err), stored: stored.map(Arc::from) });
@@ -312,8 +320,8 @@ pub(super) struct Store {
     shard: Shard,
     journal: File,
     journal_path: PathBuf,
-    /// Results in the journal.
-    held: Vec<Answer>,
+    /// Results in the journal, not yet in a part.
+    pending: Vec<Answer>,
     synced: Instant,
 }
 
@@ -333,6 +341,7 @@ impl Store {
             let path = path.to_owned();
             move |source: std::io::Error| Error::Write { path, source }
         };
+        // Results of another study are replaced only if the caller wants that.
         if let Some(known) = known_manifest(folder)? {
             if known.fingerprint != manifest.fingerprint {
                 if !overwrite {
@@ -345,6 +354,7 @@ impl Store {
             let what = "exists without study.json: choose another folder".into();
             return Err(SweepError::Broken { place: Place::of_file(folder.join(RUNS).display()), what }.into());
         }
+        // A new folder gets its manifest, the shard its journal, which one process at a time writes.
         let parts = folder.join(PARTS);
         std::fs::create_dir_all(&parts).map_err(write(&parts))?;
         let text = serde_json::to_string_pretty(&manifest).expect("plain numbers and strings") + "\n";
@@ -359,12 +369,13 @@ impl Store {
             // On file systems without locks the user must avoid two processes on one shard.
             Ok(()) | Err(TryLockError::Error(_)) => {}
         }
-        let (held, whole) = read_journal(&journal_path, &manifest)?;
+        // A truncated last line is cut off.
+        let (pending, whole) = read_journal(&journal_path, &manifest)?;
         journal.set_len(whole).and_then(|()| journal.seek(SeekFrom::End(0))).map_err(write(&journal_path))?;
         let mut collected = Collected::default();
         collected.read(folder, &manifest)?;
         let folder = folder.to_owned();
-        Ok((Self { folder, manifest, shard, journal, journal_path, held, synced: Instant::now() }, collected))
+        Ok((Self { folder, manifest, shard, journal, journal_path, pending, synced: Instant::now() }, collected))
     }
 
     /// Stores the result of a run, so that it survives the end of the program.
@@ -384,8 +395,8 @@ impl Store {
             self.journal.sync_data().map_err(failed)?;
             self.synced = Instant::now();
         }
-        self.held.push(answer);
-        if self.held.len() >= ROLL {
+        self.pending.push(answer);
+        if self.pending.len() >= ROLL {
             self.roll(sweep)?;
         }
         Ok(())
@@ -397,19 +408,19 @@ impl Store {
     /// As [`Store::keep`].
     pub(super) fn roll(&mut self, sweep: &Sweep) -> Result<(), Error> {
         let failed = |source| Error::Write { path: self.journal_path.clone(), source };
-        if self.held.is_empty() {
+        if self.pending.is_empty() {
             return Ok(());
         }
         let parts = self.folder.join(PARTS);
         let name = |k: usize| parts.join(format!("{}-{k}.parquet", self.shard.stem()));
         let number = (0..).find(|k| !name(*k).exists()).unwrap_or(0);
-        self.held.sort_by_key(|answer| answer.run);
-        self.held.dedup_by_key(|answer| answer.run);
-        table::write(&name(number), &sweep.table(&self.held, &self.manifest), CreateOptions::default())?;
+        self.pending.sort_by_key(|answer| answer.run);
+        self.pending.dedup_by_key(|answer| answer.run);
+        table::write(&name(number), &sweep.table(&self.pending, &self.manifest), CreateOptions::default())?;
         // Until now the runs are in both files, so that a crash loses none.
         self.journal.set_len(0).and_then(|()| self.journal.seek(SeekFrom::Start(0))).map_err(failed)?;
         self.journal.sync_data().map_err(failed)?;
-        self.held.clear();
+        self.pending.clear();
         Ok(())
     }
 
@@ -458,18 +469,12 @@ pub(super) fn clear(folder: &Path) -> Result<(), Error> {
 impl Sweep {
     /// Returns the table of some runs, in the given order.
     pub(super) fn table(&self, answers: &[Answer], manifest: &Manifest) -> DataTable {
+        // Run, status, parameters, metrics, reason, caveats.
         let values: Vec<Vec<ParameterValue>> = answers.iter().map(|answer| self.design.values(answer.run)).collect();
+        let status = |answer: &Answer| Some(if answer.result.is_ok() { "done" } else { "failed" }.to_owned());
         let mut columns = vec![
             DataColumn::new("run", DataValues::Whole(answers.iter().map(|answer| answer.run as i64).collect())),
-            DataColumn::new(
-                "status",
-                DataValues::Text(
-                    answers
-                        .iter()
-                        .map(|answer| Some(if answer.result.is_ok() { "done" } else { "failed" }.to_owned()))
-                        .collect(),
-                ),
-            ),
+            DataColumn::new("status", DataValues::Text(answers.iter().map(status).collect())),
         ];
         for (k, column) in self.design.columns.iter().enumerate() {
             let own = values.iter().map(|values| &values[k]);

@@ -1,5 +1,8 @@
 //! Targets of a parameter's path: the robot file, the motion, the loads, an option, or the job of a
 //! reduced link.
+//!
+//! [`Target::parse`] reads a path, [`edits`] finds the values that it changes. Not here: paths within a
+//! file ([`super::path`]).
 
 use super::file::Role;
 use super::path::{Segment, ValueLocation, changed, leaves, near, places, segments, written};
@@ -108,6 +111,7 @@ pub(super) fn edits(
     if found.is_empty() {
         return Err(format!("{text:?} matches no entry; {}", near(text, &leaves(root))));
     }
+    // A value replaces; a factor or offset needs a number, which an earlier edit may have changed.
     let edit = |place: ValueLocation| {
         let before = known.iter().rev().find(|edit| edit.place == place).and_then(|edit| plain(&edit.value));
         let old = before.as_ref().or(place.value(root));

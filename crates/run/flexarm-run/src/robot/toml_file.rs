@@ -1,5 +1,7 @@
 //! Reading of flexarm's own TOML files: each begins with `format = 1`, and errors name their
 //! location.
+//!
+//! Start at [`parsed`]; [`word`] reads keys with a choice of words, such as units.
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_settings::exact;
@@ -52,4 +54,24 @@ pub fn parsed<T: DeserializeOwned>(
         Some((span, message)) => Err(source.error(span, message)),
         None => Ok(file),
     }
+}
+
+/// Returns the entry of a table of words for the value of a key; the first entry without a value.
+///
+/// # Errors
+/// [`RobotFileError`] at the value, with the words of the table.
+///
+/// # Panics
+/// Panics if the table is empty.
+pub fn word<'a, T>(
+    source: &Source,
+    key: &str,
+    given: &Option<Spanned<String>>,
+    known: &'a [(&'static str, T)],
+) -> Result<&'a (&'static str, T), RobotFileError> {
+    let Some(given) = given else { return Ok(&known[0]) };
+    known.iter().find(|(word, _)| word == given.get_ref()).ok_or_else(|| {
+        let words: Vec<&str> = known.iter().map(|(word, _)| *word).collect();
+        source.error(given.span(), format!("{key} = {:?} is not known; use one of {words:?}", given.get_ref()))
+    })
 }

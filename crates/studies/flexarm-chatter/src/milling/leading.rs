@@ -3,6 +3,9 @@
 //! Small maps are converted to matrices. Large ones are treated with the Arnoldi method: most of
 //! their eigenvalues are almost zero, because the motion one period ago acts only through a few
 //! shapes, so that a subspace slightly larger than the number of states contains all relevant ones.
+//!
+//! Start at [`leading`]. Not here: the map (`period.rs`), the search for the depth at which the
+//! magnitude is 1 (`limit.rs`).
 
 use nalgebra::{Complex, DMatrix, DVector};
 
@@ -15,12 +18,17 @@ const EXACT: f64 = 1e-10;
 /// Initial number of directions beyond the number of states.
 const MORE: usize = 30;
 
-/// Returns the leading eigenvalue; infinite for a map that overflows.
+/// Returns the eigenvalue of maximum magnitude: the cut is stable if it is below 1. Infinite for a map
+/// that overflows.
+///
+/// Cost: for `n` directions of the subspace, `n` applications of the map and the eigenvalues of an
+/// n×n matrix; never more than those of the whole map.
 pub fn leading(map: &PeriodMap) -> Complex<f64> {
     if map.size() <= SMALL {
         return largest(&map.matrix());
     }
     let mut krylov = Krylov::new(map);
+    // The subspace grows by half until the residual of the eigenvalue is small.
     let mut wanted = map.n_states() + MORE;
     loop {
         if 3 * wanted > 2 * map.size() {
@@ -37,7 +45,8 @@ pub fn leading(map: &PeriodMap) -> Complex<f64> {
     }
 }
 
-/// Returns the largest eigenvalue of a matrix.
+/// Returns the eigenvalue of maximum magnitude of a square matrix; zero for an empty one, infinite for
+/// one that is not finite.
 pub fn largest(matrix: &DMatrix<f64>) -> Complex<f64> {
     let larger = |a: &Complex<f64>, b: &Complex<f64>| a.norm_sqr().total_cmp(&b.norm_sqr());
     // The eigenvalue iteration would not terminate.
@@ -102,6 +111,7 @@ impl<'a> Krylov<'a> {
     fn residual(&self, H: &DMatrix<f64>, value: Complex<f64>) -> f64 {
         let n = H.nrows();
         let shift = value * (1.0 + 1e-12) + Complex::new(1e-300, 0.0);
+        // Inverse iteration for the eigenvector y of H; V y is the Ritz vector of A.
         let lu = (H.map(|x| Complex::new(x, 0.0)) - DMatrix::identity(n, n) * shift).lu();
         let mut y = DVector::from_element(n, Complex::new(1.0, 0.5));
         for _ in 0..2 {

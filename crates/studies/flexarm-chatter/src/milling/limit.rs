@@ -2,6 +2,9 @@
 //!
 //! The depth is searched upwards with elements of half a period of the fastest relevant mode. The
 //! limit found is then refined with elements of half the length until it converges.
+//!
+//! Start at [`limit_of_depth`]. Speeds in rad/s, depths in m. Not here: the map over a period
+//! ([`super::period`]), its leading eigenvalue ([`super::leading`]).
 
 use std::f64::consts::{PI, TAU};
 
@@ -91,6 +94,7 @@ pub fn limit_of_depth(
     spindle: f64,
     options: &LimitOptions,
 ) -> Result<Option<Limit>, ChatterError> {
+    // First crossing on coarse elements, then near it on finer ones until it stays.
     check(cutter, spindle, options)?;
     let mut longest = first_length(structure, cutter, spindle, options);
     let mut period = Period::new(structure, cutter, spindle, longest);
@@ -177,6 +181,7 @@ pub fn leading_multiplier(
     }
 }
 
+/// Checks cutter, speed and options.
 fn check(cutter: &Cutter, spindle: f64, options: &LimitOptions) -> Result<(), ChatterError> {
     cutter.check()?;
     let positive = |x: f64| x.is_finite() && x > 0.0;
@@ -192,6 +197,7 @@ fn check(cutter: &Cutter, spindle: f64, options: &LimitOptions) -> Result<(), Ch
     }
 }
 
+/// Refuses maps whose eigenvalues would take too long.
 fn check_size(period: &Period, depth: f64, spindle: f64) -> Result<(), ChatterError> {
     let unknowns = period.unknowns(depth);
     if unknowns > MAX_UNKNOWNS {
@@ -221,6 +227,7 @@ fn growth(period: &Period, depth: f64) -> f64 {
     leading(&period.at(depth)).norm().ln()
 }
 
+/// Returns the ratio of neighbouring depths of the search.
 fn step_ratio(options: &LimitOptions) -> f64 {
     (1.0 / SHALLOWEST).powf(1.0 / (options.depths - 1) as f64)
 }
@@ -321,6 +328,7 @@ fn crossing(period: &Period, mut a: (f64, f64), mut b: (f64, f64)) -> f64 {
     0.5 * (a.0 + b.0)
 }
 
+/// Returns the limit with its kind and frequencies, from the multiplier there.
 fn described(structure: &Structure, cutter: &Cutter, spindle: f64, period: &Period, depth: f64, change: f64) -> Limit {
     let map = period.at(depth);
     let multiplier = leading(&map);

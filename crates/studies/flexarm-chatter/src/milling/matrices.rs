@@ -6,7 +6,7 @@
 //! In the coordinates of the undamped modes, `x = Φ η`, with `z = (Ω η, η')`, the norm of the
 //! first-order matrix is proportional to the highest frequency, not to its square. Its right and
 //! left eigenvectors give the poles; the frequency response of the poles is then checked against
-//! that of the matrices.
+//! that of the matrices. Not here: structures from given modes ([`Structure::from_modes`]).
 
 use nalgebra::{Cholesky, Complex, DMatrix, Matrix3, Matrix3xX, Schur, SymmetricEigen, Vector3};
 
@@ -40,6 +40,7 @@ impl Structure {
         if n == 0 {
             return Self::from_poles(Vec::new());
         }
+        // Modal coordinates of the undamped structure.
         let (omega, Phi) = undamped(M, K)?;
         let (D_eta, K_eta, J_eta) = (Phi.tr_mul(&(D * &Phi)), Phi.tr_mul(&(K * &Phi)), J * &Phi);
         // z' = A z + (0, Φᵀ Jᵀ F).
@@ -100,6 +101,7 @@ impl Structure {
     }
 }
 
+/// Checks sizes and finite values.
 fn check(M: &DMatrix<f64>, D: &DMatrix<f64>, K: &DMatrix<f64>, J: &Matrix3xX<f64>) -> Result<(), ChatterError> {
     let n = M.nrows();
     for (what, matrix) in [("mass matrix", M), ("damping matrix", D), ("stiffness matrix", K)] {

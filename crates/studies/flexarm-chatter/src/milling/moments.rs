@@ -78,7 +78,11 @@ impl Rule {
         Moments { decay, integrals }
     }
 
-    /// Integrals up to `c` by quadrature, for small `z`.
+    /// Returns the integrals `I_j(c)` up to a target by Gauss quadrature on (0, c).
+    ///
+    /// * `z`: pole times the length of the element; exact to rounding up to a magnitude of 7, above
+    ///   which the exponential is not resolved.
+    /// * `c`: position of the target, in element lengths; `target`: its number.
     pub fn by_quadrature(&self, z: Complex<f64>, c: f64, target: usize) -> [Complex<f64>; NODES] {
         let mut sum = [Complex::new(0.0, 0.0); NODES];
         for (back, row) in self.backward.iter().zip(&self.table[target]) {
@@ -90,7 +94,14 @@ impl Rule {
         sum
     }
 
-    /// Integrals by repeated integration by parts, for large `z`.
+    /// Returns the integrals `I_j(c)` up to a target by repeated integration by parts,
+    ///
+    /// ```text
+    /// I_j(c) = Σ_n (e^{z c} ℓ_j⁽ⁿ⁾(0) - ℓ_j⁽ⁿ⁾(c)) / z^{n+1},
+    /// ```
+    /// a finite sum since ℓ_j is a polynomial; small `z` cancel.
+    ///
+    /// * `decay`: `e^{z c}`; `target`: number of the target.
     pub fn by_parts(&self, z: Complex<f64>, decay: Complex<f64>, target: usize) -> [Complex<f64>; NODES] {
         let mut sum = [Complex::new(0.0, 0.0); NODES];
         let mut factor = z.inv();
@@ -104,7 +115,7 @@ impl Rule {
     }
 }
 
-/// Computes Gauss-Legendre nodes and weights on (0, 1).
+/// Computes Gauss-Legendre nodes and weights on (0, 1), by Newton's method on the Legendre polynomial.
 fn gauss<const N: usize>() -> ([f64; N], [f64; N]) {
     let (mut nodes, mut weights) = ([0.0; N], [0.0; N]);
     for k in 0..N {

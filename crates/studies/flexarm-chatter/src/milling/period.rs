@@ -44,6 +44,7 @@ struct Stretch {
 }
 
 enum Motion {
+    /// Factors `e^{λ h}` of the poles.
     Free(Vec<Complex<f64>>),
     Cutting(Box<Answers>),
 }
@@ -89,6 +90,7 @@ impl<'a> Period<'a> {
         }
     }
 
+    /// Divides the period at entries and exits of teeth.
     fn stretches(&self, depth: f64) -> Vec<Stretch> {
         let events = self.cutter.events(depth);
         let stretch = |ends: &[f64]| {
@@ -104,6 +106,7 @@ impl<'a> Period<'a> {
         events.windows(2).map(stretch).collect()
     }
 
+    /// Computes the response of all poles within an element of length `h` (s), by its moments.
     fn answers(&self, h: f64) -> Answers {
         let (poles, nz) = (self.structure.poles(), self.structure.n_states());
         let mut answers = Answers {
@@ -324,6 +327,7 @@ impl PeriodMap {
     }
 }
 
+/// Multiplies the states of each pole by its factor `e^{λ h}`.
 fn rotate(state: &mut DMatrix<f64>, rotations: &[Rotation]) {
     for mut column in state.column_iter_mut() {
         let mut row = 0;

@@ -101,6 +101,7 @@ pub fn gear_stiffness(runs: &[Vec<GearOutput>]) -> Option<Vec<GearEstimate>> {
     let left: Vec<Fit> = blocks.filter_map(|block| Fit::of(runs, &all, Some(block))).collect();
     let others = |run: usize| all.iter().copied().filter(|k| *k != run).collect::<Vec<_>>();
     let without: Vec<Fit> = all.iter().map(|run| Fit::of(runs, &others(*run), None)).collect::<Option<_>>()?;
+    // Per spring: both jackknives, and what the torque explains of seen and unseen runs.
     let of = |motor: usize| {
         let scatter = |fits: &[Fit]| jackknife(&fits.iter().map(|fit| fit.compliance[motor]).collect::<Vec<_>>());
         let unseen = runs.iter().zip(&without).map(|(run, fit)| squares(&fit.curves(run, motor)));

@@ -1,4 +1,7 @@
 //! Result of an identification: estimates, cross-validation, and the reasons why it fails.
+//!
+//! Start at [`Identified`]. Values are in SI units; the order of parameters and residuals is that of
+//! the request and of the readings. Not here: how they are computed (`identify.rs`).
 
 use flexarm_kinematics::Pose;
 use nalgebra::{DMatrix, DVector, Vector3};

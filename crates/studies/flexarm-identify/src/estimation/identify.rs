@@ -66,11 +66,13 @@ pub fn identify(
             format!("{} parameters and {rows} measured numbers: at least one of each is needed", parameters.len());
         return Err(IdentifyError::Readings(text));
     }
+    // Instruments start at their best fit to the arm at the start of the search.
     let mut unknowns = unknowns(parameters, measurements);
     let start: Vec<f64> = parameters.iter().zip(&unknowns).map(|(p, u)| p.search(u.start).0).collect();
     let measurements = placed(&nominal.with(parameters, &start), measurements)?;
     unknowns.extend((0..measurements.own_unknowns()).map(|_| Unknown::free()));
     let fit = Fit { nominal, parameters, measurements: &measurements, search: &options.search, watch };
+    // Residuals of the robot file as it is, with instruments and targets fitted.
     let before = Fit { parameters: &[], watch: &|_| true, ..fit }.solved(&unknowns[parameters.len()..]);
     let before = match before {
         Ok(found) => found.residuals.as_slice().to_vec(),
@@ -174,6 +176,7 @@ impl Fit<'_> {
         if !self.measurements.readings.iter().any(|reading| responds(&reading.kind)) {
             return self.solved(unknowns);
         }
+        // A start in search coordinates: the logarithm first, then the form that is asked for.
         let logarithmic = self.measurements.logarithmic();
         let from = |starts: &dyn Fn(usize, &Parameter) -> f64| {
             let mut begun = unknowns.to_vec();
@@ -187,6 +190,7 @@ impl Fit<'_> {
             self.solved(&begun)
         };
         let mut best = from(&|_, _| 0.0);
+        // Further starts, and the best of them.
         for number in 0..STARTS {
             if best.as_ref().is_ok_and(|best| self.misfit(best).is_none_or(|factor| factor < 1.0) && self.is_known()) {
                 break;
@@ -228,6 +232,7 @@ impl Fit<'_> {
     /// Predicts the readings of each fold from the other folds; readings at one pose are in one
     /// fold.
     fn held_out(&self, solution: &Solution, before: &[f64], folds: usize) -> Option<HeldOut> {
+        // Number of the pose of each row; prior knowledge has none and stands alone.
         let mut poses: Vec<&[f64]> = Vec::new();
         let mut pose_of_row = Vec::new();
         for reading in &self.measurements.readings {
@@ -242,6 +247,7 @@ impl Fit<'_> {
         if folds < 2 {
             return None;
         }
+        // Residuals of each fold, predicted from the rest of the solution.
         let noise = self.measurements.noise();
         let (mut residuals, mut skipped) = (vec![f64::NAN; noise.len()], 0);
         for fold in 0..folds {
@@ -264,14 +270,19 @@ impl Fit<'_> {
         })
     }
 
+    /// Returns the result: estimates, outliers, undetermined combinations, cross-validation.
+    ///
+    /// * `before`: residuals with the initial values.
     fn summary(&self, unknowns: &[Unknown], solution: Solution, before: Vec<f64>, folds: usize) -> Identified {
         let Self { parameters, measurements, .. } = *self;
         let mut x = solution.unknowns.clone();
         let rates = to_search(parameters, &mut x);
+        // Correlations in search coordinates: a falling one, such as that of a compliance, changes the sign.
         let C = &solution.covariance;
         let p = parameters.len();
         let sign = |i: usize, j: usize| (rates[i] * rates[j]).signum();
         let correlation = DMatrix::from_fn(p, p, |i, j| sign(i, j) * C[(i, j)] / (C[(i, i)] * C[(j, j)]).sqrt());
+        // Outliers: residuals over their own deviation after the fit, `r / √(1 - h)` with the leverage h.
         let r = solution.residuals.component_div(&solution.deviations);
         let over_own = |(r, h): (&f64, &f64)| r / (1.0 - h).max(1e-6).sqrt();
         let normalised: Vec<f64> = r.iter().zip(solution.leverages.iter()).map(over_own).collect();

@@ -218,6 +218,7 @@ pub fn solve<P: Residuals>(
     search: &Search,
     watch: &dyn Fn(&Progress) -> bool,
 ) -> Result<Solution, SolveError<P::Error>> {
+    // First errors of the model from the residuals at the start.
     let start = DVector::from_iterator(unknowns.len(), unknowns.iter().map(|u| u.start.max(u.lower)));
     let mut J = DMatrix::zeros(0, 0);
     let r = evaluated(problem, &start, &mut J)?;
@@ -234,6 +235,7 @@ pub fn solve<P: Residuals>(
     fit.first_errors(&r);
     let mut state = State { x: start, r, J, damping: 1e-4 };
     let (mut iterations, mut kept, mut converged) = (0, fit.errors.is_empty(), unknowns.is_empty());
+    // Steps and errors in turn until the errors settle; then steps alone until they are short.
     while iterations < search.most_iterations && !converged {
         iterations += 1;
         let (moved, step) = fit.step(&mut state)?;
@@ -253,6 +255,7 @@ pub fn solve<P: Residuals>(
     fit.finish(state, iterations, converged)
 }
 
+/// Evaluates residuals and derivatives, which must be finite.
 fn evaluated<P: Residuals>(
     problem: &P,
     x: &DVector<f64>,
@@ -273,6 +276,7 @@ struct State {
     damping: f64,
 }
 
+/// Problem with the present errors of the model.
 struct Fit<'a, P> {
     problem: &'a P,
     noise: &'a [Noise],
@@ -304,11 +308,13 @@ impl<P: Residuals> Fit<'_, P> {
         self.set_deviations();
     }
 
+    /// Returns the residuals of a kind with their noise.
     fn rows_of(&self, r: &DVector<f64>, kind: usize) -> Vec<(f64, Noise)> {
         let all = r.iter().zip(self.noise).filter(|(_, noise)| noise.kind == Some(kind));
         all.map(|(r, noise)| (*r, *noise)).collect()
     }
 
+    /// Sets the standard deviations `s` to the present errors and shares.
     fn set_deviations(&mut self) {
         let of = |noise: &Noise| match noise.kind {
             Some(kind) => (self.shares[kind] * noise.std).hypot(self.errors[kind] * noise.size),
@@ -373,6 +379,7 @@ impl<P: Residuals> Fit<'_, P> {
         if !cost.is_finite() {
             return Err(SolveError::NotFinite);
         }
+        // Half the gradient of the cost, and the bounds on the step.
         let (rows, normal) = self.normal(state);
         let mut gradient = rows.tr_mul(&state.r.component_mul(&self.roots(&state.r)));
         for ((g, unknown), x) in gradient.iter_mut().zip(self.unknowns).zip(state.x.iter()) {
@@ -382,6 +389,7 @@ impl<P: Residuals> Fit<'_, P> {
             self.unknowns.len(),
             self.unknowns.iter().zip(state.x.iter()).map(|(u, x)| u.lower - x),
         );
+        // Levenberg-Marquardt: the damping grows until a step does not increase the cost.
         let diagonal = normal.diagonal();
         let mut size = 0.0;
         for _ in 0..12 {
@@ -418,6 +426,7 @@ impl<P: Residuals> Fit<'_, P> {
         Ok((false, size))
     }
 
+    /// Returns the solution, after checking that the rows determine what has no prior.
     fn finish(self, state: State, iterations: usize, converged: bool) -> Result<Solution, SolveError<P::Error>> {
         let (rows, normal) = self.normal(&state);
         let own: Vec<usize> = (0..self.unknowns.len()).filter(|k| self.unknowns[*k].prior.is_none()).collect();

@@ -197,6 +197,12 @@ impl<'a> Workspaces<'a> {
         Cow::Owned(all)
     }
 
+    /// Returns the arm that carries a load's mass, and its parameters, none without derivatives.
+    fn vibrating(&self, load: &LoadCase, slopes: bool) -> (NominalArm, Cow<'a, [Parameter]>) {
+        let parameters = if slopes { self.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+        (self.loaded(&load.carried), parameters)
+    }
+
     /// Returns the arm with a mass at its tool; inertia about the tool's origin, tool axes.
     fn loaded(&self, carried: &SpatialInertia) -> NominalArm {
         let tool = &self.nominal.tool;
@@ -224,7 +230,9 @@ impl MeasuredArm<'_> {
         let of = |reading: &Reading| -> Vec<f64> {
             match &reading.kind {
                 ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
-                ReadingKind::Place { rows, .. } => rows.iter().map(|row| row.value).collect(),
+                ReadingKind::Place { rows, .. } | ReadingKind::Frequencies { rows, .. } => {
+                    rows.iter().map(|row| row.value).collect()
+                }
                 ReadingKind::Known { value, .. } => vec![*value],
                 ReadingKind::TargetAt { value, .. } => value.iter().copied().collect(),
                 ReadingKind::InstrumentAt { value, std, .. } => {
@@ -232,7 +240,6 @@ impl MeasuredArm<'_> {
                         std.map_or(Vec::new(), |_| value.inverse().translation.vector.iter().copied().collect());
                     place.into_iter().chain([0.0; 3]).collect()
                 }
-                ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.value).collect(),
                 ReadingKind::Response(response) => {
                     (0..response.points.len()).flat_map(|k| response.numbers(k, response.points[k].1)).collect()
                 }
@@ -324,8 +331,7 @@ impl MeasuredArm<'_> {
                 Ok(self.instrument_at(*instrument, value, std.is_some(), own, slopes))
             }
             ReadingKind::Frequencies { load, rows } => {
-                let nominal = workspaces.loaded(&load.carried);
-                let parameters = if slopes { workspaces.under(&load.carried) } else { Cow::Borrowed(&[][..]) };
+                let (nominal, parameters) = workspaces.vibrating(load, slopes);
                 let found = frequency_slopes(&nominal, &parameters, &reading.q).map_err(named)?;
                 let values = rows.iter().map(|row| found.hz.get(row.of).copied().unwrap_or(f64::NAN)).collect();
                 let slopes = self.with_own(rows.len(), own.len(), slopes, |i, j| found.slopes[(rows[i].of, j)]);
@@ -399,8 +405,7 @@ impl MeasuredArm<'_> {
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let nominal = workspaces.loaded(&measured.load.carried);
-        let parameters = if slopes { workspaces.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let (nominal, parameters) = workspaces.vibrating(&measured.load, slopes);
         let probes = [measured.watched.clone(), measured.hit.clone()];
         let omega: Vec<f64> = measured.points.iter().map(|(omega, ..)| *omega).collect();
         let found = structure_slopes(&nominal, &parameters, q, &probes)?.response(0, 1, measured.answer, &omega)?;
@@ -421,8 +426,7 @@ impl MeasuredArm<'_> {
         own: usize,
         slopes: bool,
     ) -> Result<Block, StepError> {
-        let nominal = workspaces.loaded(&measured.load.carried);
-        let parameters = if slopes { workspaces.under(&measured.load.carried) } else { Cow::Borrowed(&[][..]) };
+        let (nominal, parameters) = workspaces.vibrating(&measured.load, slopes);
         let found = structure_slopes(&nominal, &parameters, q, &measured.probes)?;
         let none = || StepError::Singular { matrix: "mode shapes at the measured points (they do not move)", t: 0.0 };
         let (mode, _, unit) = measured.likeliest(&found).ok_or_else(none)?;

@@ -19,6 +19,7 @@ use crate::estimation::reading::{Component, Instrument, Measurements, Reading, R
 pub(crate) fn placed(nominal: &NominalArm, measurements: &Measurements) -> Result<Measurements, IdentifyError> {
     let mut placed = measurements.clone();
     for number in 0..measurements.instruments.len() {
+        // A pose given with its deviations is its own initial value.
         let is_prior = |reading: &Reading| matches!(reading.kind, ReadingKind::InstrumentAt { instrument, .. } if instrument == number);
         if measurements.readings.iter().any(is_prior) {
             continue;
@@ -28,6 +29,7 @@ pub(crate) fn placed(nominal: &NominalArm, measurements: &Measurements) -> Resul
         };
         placed.instruments[number] = match measurements.instruments[number] {
             known @ Instrument::Known(_) => known,
+            // X_IW from the measured places: the rigid transform from the points of the nominal arm.
             Instrument::Unknown(_) => {
                 let of_it = |reading: &Reading| {
                     let own = matches!(reading.kind, ReadingKind::Place { instrument, .. } if instrument == number);
@@ -41,6 +43,7 @@ pub(crate) fn placed(nominal: &NominalArm, measurements: &Measurements) -> Resul
                     ))
                 })?)
             }
+            // R_IW from complete displacements: they are vectors, so the origin is irrelevant.
             Instrument::Axes(_) => {
                 let of_it = |reading: &Reading| has_all_components(&reading.kind, number);
                 let [world, own] = both_points(nominal, measurements, of_it)?;

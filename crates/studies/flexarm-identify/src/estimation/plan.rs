@@ -4,6 +4,12 @@
 //! maximum determinant of the information matrix (D-optimal), or minimum variance of given
 //! quantities. Candidates are first added greedily, then exchanged as long as this improves the
 //! plan (Fedorov). The information of the prior is included from the start.
+//!
+//! ```text
+//! I = 1 + Σ J_kᵀ J_k,   maximise ln det I,   or minimise Σ tr(J_p I^-1 J_pᵀ)
+//! ```
+//! with the Jacobians J of chosen readings k and purposes p over their deviations, per prior deviation of
+//! each parameter. Not here: which poses and loads are candidates ([`crate::plan_file`]).
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 
@@ -71,6 +77,7 @@ pub fn plan(
     candidates: &[Reading],
     options: &PlanOptions,
 ) -> Result<Plan, NoAnswer> {
+    // Scaled Jacobians; a candidate without an equilibrium is not one.
     let p = parameters.len();
     let rows: Vec<Option<DMatrix<f64>>> = candidates
         .iter()
@@ -87,6 +94,7 @@ pub fn plan(
         search.chosen.push(best);
     }
     search.exchange(&mut information);
+    // Expected deviations from the information of the plan.
     let inverse = inverse_of(&information);
     let deviations = (0..p).map(|k| prior(&parameters[k]) * inverse[(k, k)].sqrt()).collect();
     let deviation_of = |J: &DMatrix<f64>, i: usize| (J.row(i) * &inverse * J.row(i).transpose())[(0, 0)].sqrt();
@@ -97,16 +105,19 @@ pub fn plan(
     Ok(Plan { deviations, gain: log_determinant(&information), purpose: purpose.collect(), chosen: search.chosen })
 }
 
+/// Returns the covariance of the scaled parameters.
 fn inverse_of(information: &DMatrix<f64>) -> DMatrix<f64> {
     // Positive definite, because it includes the identity of the prior.
     Cholesky::new(information.clone())
         .map_or_else(|| DMatrix::identity(information.nrows(), information.nrows()), |f| f.inverse())
 }
 
+/// Returns the logarithm of the determinant, by Cholesky.
 fn log_determinant(information: &DMatrix<f64>) -> f64 {
     Cholesky::new(information.clone()).map_or(f64::NEG_INFINITY, |f| 2.0 * f.l_dirty().diagonal().map(f64::ln).sum())
 }
 
+/// Search for the best candidates; rows are scaled Jacobians, `None` without a solution.
 struct Choice<'a> {
     rows: &'a [Option<DMatrix<f64>>],
     purpose: &'a [DMatrix<f64>],
@@ -114,6 +125,7 @@ struct Choice<'a> {
 }
 
 impl Choice<'_> {
+    /// Adds the information `Jᵀ J` of a candidate, or removes it with `sign` -1.
     fn add(&self, information: &mut DMatrix<f64>, candidate: usize, sign: f64) {
         if let Some(J) = &self.rows[candidate] {
             *information += J.tr_mul(J) * sign;

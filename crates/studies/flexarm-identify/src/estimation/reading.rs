@@ -28,12 +28,6 @@ impl LoadCase {
     }
 }
 
-impl Default for LoadCase {
-    fn default() -> Self {
-        Self::none()
-    }
-}
-
 /// One measured number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row<T> {
@@ -240,11 +234,10 @@ impl Reading {
     pub fn rows(&self) -> usize {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.len(),
-            ReadingKind::Place { rows, .. } => rows.len(),
+            ReadingKind::Place { rows, .. } | ReadingKind::Frequencies { rows, .. } => rows.len(),
             ReadingKind::Known { .. } => 1,
             ReadingKind::TargetAt { .. } => 3,
             ReadingKind::InstrumentAt { std, .. } => 3 + 3 * usize::from(std.is_some()),
-            ReadingKind::Frequencies { rows, .. } => rows.len(),
             ReadingKind::Response(response) => 2 * response.points.len(),
             ReadingKind::Shape(shape) => shape.probes.len(),
         }
@@ -265,13 +258,14 @@ impl Reading {
     pub fn deviations(&self) -> Vec<f64> {
         match &self.kind {
             ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.std).collect(),
-            ReadingKind::Place { rows, .. } => rows.iter().map(|row| row.std).collect(),
+            ReadingKind::Place { rows, .. } | ReadingKind::Frequencies { rows, .. } => {
+                rows.iter().map(|row| row.std).collect()
+            }
             ReadingKind::Known { std, .. } => vec![*std],
             ReadingKind::TargetAt { std, .. } => vec![*std; 3],
             ReadingKind::InstrumentAt { std, std_rotation, .. } => {
                 std.map_or(Vec::new(), |std| vec![std; 3]).into_iter().chain([*std_rotation; 3]).collect()
             }
-            ReadingKind::Frequencies { rows, .. } => rows.iter().map(|row| row.std).collect(),
             ReadingKind::Response(response) => response.points.iter().flat_map(|(.., std)| *std).collect(),
             ReadingKind::Shape(shape) => vec![shape.std; shape.probes.len()],
         }

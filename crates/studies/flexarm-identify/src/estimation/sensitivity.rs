@@ -166,26 +166,23 @@ fn frame_differences(
     some: &[usize],
     (forces, twists): (&mut DMatrix<f64>, &mut Matrix6xX<f64>),
 ) {
-    let n = at.deflections().len();
-    let mut plant = at.plant().clone();
-    let mut moved = [DVector::zeros(n), DVector::zeros(n)];
+    let plant = at.plant().clone();
+    let mut r = DVector::zeros(at.deflections().len());
     for &k in some {
         let Effect::Frame { body, twist, .. } = &parameters[k].effect else { continue };
-        let X_PJ = plant.model.bodies()[*body].X_PJ;
-        let [behind, ahead] = [-FRAME_STEP, FRAME_STEP].map(|step| {
-            Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ * displacement(&(twist * step)));
-            at.forces_of(&plant, &mut moved[usize::from(step > 0.0)]);
-            at.pose_of(frame)
+        // Unbalanced forces and pose of the frame on both sides, at unchanged coordinates.
+        let [(r_ahead, ahead), (r_behind, behind)] = frames_beside(&plant, *body, twist).map(|plant| {
+            at.forces_of(&plant, &mut r);
+            (r.clone(), at.pose_of(frame))
         });
-        Arc::make_mut(&mut plant.model).set_joint_frame(*body, X_PJ);
-        forces.set_column(k, &((&moved[1] - &moved[0]) / (2.0 * FRAME_STEP)));
+        forces.set_column(k, &((r_ahead - r_behind) / (2.0 * FRAME_STEP)));
         let turn = rotation_vector((ahead.rotation * behind.rotation.inverse()).matrix());
         let shift = ahead.translation.vector - behind.translation.vector;
         let twist = shift.iter().chain(&turn).map(|x| x / (2.0 * FRAME_STEP));
         twists.set_column(k, &Vector6::from_iterator(twist));
     }
     // The poses of the operating point are those of its arm again.
-    at.forces_of(&plant, &mut moved[0]);
+    at.forces_of(&plant, &mut r);
 }
 
 /// Returns the arm with the joint frame of a body displaced by [`FRAME_STEP`] along a twist and

@@ -83,6 +83,7 @@ impl Reader<'_> {
                 }
                 Ok(())
             }
+            // An entry is one row: the same reading without a table.
             (None, Some(joints)) => {
                 let measured = FileDisplacement {
                     name: format!("displacement {}", number + 1),
@@ -168,6 +169,7 @@ impl Reader<'_> {
             let of = Component { direction: d, instrument, rotation: false };
             Row { of, value: value * self.units.length, std }
         };
+        // One number is along its direction; three are along the axes, where a gap is no reading.
         match (*value, direction) {
             (Some(Measured::One(value)), Some((direction, site))) => {
                 let d = Vector3::from(*direction);

@@ -44,6 +44,7 @@ impl Reader<'_> {
         instruments: &BTreeMap<String, Spanned<InstrumentEntry>>,
         targets: &BTreeMap<String, Spanned<TargetEntry>>,
     ) -> Result<(), Error> {
+        // Instruments: X_WI as written, kept as X_IW, which takes points to the axes of the instrument.
         for (name, entry) in instruments {
             let InstrumentEntry { xyz, rpy, std, std_rotation } = entry.get_ref();
             let all = xyz.iter().chain(rpy).flatten();
@@ -64,6 +65,7 @@ impl Reader<'_> {
             self.measurements.instrument_names.push(name.clone());
             self.measurements.instruments.push(Instrument::Known(X_WI.inverse()));
         }
+        // Targets: points in the frame of their link; without a link, of the tool.
         for (name, entry) in targets {
             let TargetEntry { link, xyz, unknown, std } = entry.get_ref();
             let frame = link.as_ref().map(|link| self.moving_link(link)).transpose()?;
@@ -130,11 +132,14 @@ impl Reader<'_> {
     ) -> Result<(), Error> {
         let InstrumentEntry { xyz, rpy, std, std_rotation } = entry.get_ref();
         let Instrument::Known(given) = self.measurements.instruments[k] else { return Ok(()) };
+        // Places require the position too; displacements only the orientation.
         let known = xyz.is_some() || (!placed && rpy.is_some());
         let deviation =
             |std: &Option<Spanned<f64>>, unit: f64| located(std).map(|std| self.std(Some(std), unit)).transpose();
         let std_place = deviation(std, self.units.length)?;
         let std_turn = deviation(std_rotation, self.units.angle)?;
+        // A known pose without deviations is exact; with all of its deviations, it is estimated and
+        // the given pose counts as a reading.
         let deviations = match (known, std_place, std_turn) {
             (false, None, None) => None,
             (true, None, None) => return Ok(()),

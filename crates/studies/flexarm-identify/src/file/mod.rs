@@ -17,7 +17,7 @@ use std::path::Path;
 
 use flexarm_files::read_text;
 use flexarm_run::robot_file::Source;
-use flexarm_run::toml_file::parsed;
+use flexarm_run::toml_file::{parsed, word};
 use flexarm_run::{Error, RobotFileError};
 use serde::Deserialize;
 use toml::Spanned;
@@ -109,6 +109,8 @@ pub(super) struct MeasurementInput {
 const LENGTHS: [(&str, f64); 3] = [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)];
 const ANGLES: [(&str, f64); 3] = [("rad", 1.0), ("deg", std::f64::consts::PI / 180.0), ("mrad", 1e-3)];
 const FORCES: [(&str, f64); 2] = [("N", 1.0), ("kN", 1e3)];
+const LOSSES: [(&str, Loss); 3] =
+    [("huber", Loss::Huber(2.5)), ("square", Loss::Square), ("cauchy", Loss::Cauchy(2.5))];
 
 /// Reads a file of measurements.
 ///
@@ -118,11 +120,11 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
     let text = read_text(path)?;
     let source = Source::new(path, &text, "measurements");
     let file: MeasurementFile = parsed(&text, &source, &[], |file: &MeasurementFile| &file.format)?;
-    let (length, length_m) = unit("length", &file.length, &LENGTHS, &source)?;
+    let &(length, length_m) = word(&source, "length", &file.length, &LENGTHS)?;
     let units = Units {
         length: length_m,
-        angle: unit("angle", &file.angle, &ANGLES, &source)?.1,
-        force: unit("force", &file.force, &FORCES, &source)?.1,
+        angle: word(&source, "angle", &file.angle, &ANGLES)?.1,
+        force: word(&source, "force", &file.force, &FORCES)?.1,
     };
     // Readings refer to instruments, targets and nodes; recordings are estimated later.
     let folder = path.parent().unwrap_or(Path::new("."));
@@ -158,7 +160,7 @@ pub(super) fn read(path: &Path, cell: &Cell<'_>) -> Result<MeasurementInput, Err
         tie: given(&file.tie),
         uncertainty: file.uncertainty.as_ref().map(|value| uncertainty(value, 1.0, &source)).transpose()?,
         known: known.collect::<Result<_, RobotFileError>>()?,
-        loss: loss(&file.loss, &source)?,
+        loss: word(&source, "loss", &file.loss, &LOSSES)?.1,
         empty_rows: reader.empty_rows,
         length,
         length_m,
@@ -171,31 +173,6 @@ fn uncertainty(value: &Spanned<f64>, above: f64, source: &Source) -> Result<f64,
     match *value.get_ref() {
         x if x.is_finite() && x > above => Ok(x),
         x => Err(source.error(value.span(), format!("uncertainty is {x}, expected a number above {above}"))),
-    }
-}
-
-fn unit(
-    key: &str,
-    given: &Option<Spanned<String>>,
-    known: &[(&'static str, f64)],
-    source: &Source,
-) -> Result<(&'static str, f64), RobotFileError> {
-    let Some(word) = given else { return Ok(known[0]) };
-    known.iter().find(|(name, _)| name == word.get_ref()).copied().ok_or_else(|| {
-        let names: Vec<&str> = known.iter().map(|(name, _)| *name).collect();
-        source.error(word.span(), format!("{key} = {:?} is not known; use one of {names:?}", word.get_ref()))
-    })
-}
-
-fn loss(given: &Option<Spanned<String>>, source: &Source) -> Result<Loss, RobotFileError> {
-    match given.as_ref().map(|word| word.get_ref().as_str()) {
-        None | Some("huber") => Ok(Loss::Huber(2.5)),
-        Some("square") => Ok(Loss::Square),
-        Some("cauchy") => Ok(Loss::Cauchy(2.5)),
-        Some(other) => {
-            let span = given.as_ref().map_or(0..0, Spanned::span);
-            Err(source.error(span, format!("loss = {other:?} is not known; use \"huber\", \"square\" or \"cauchy\"")))
-        }
     }
 }
 

@@ -1,4 +1,7 @@
 //! Positions of targets in the axes of an instrument: an entry, or the rows of a table.
+//!
+//! Start at [`Reader::place`]. Values keep the units of the file up to `Reader::add_place`.
+//! Not here: instruments and targets themselves (`frame.rs`), displacements (`displacement.rs`).
 
 use std::path::PathBuf;
 
@@ -73,6 +76,7 @@ impl Reader<'_> {
             Some(own) => self.table_with(file, own)?,
             None => self.table(file, &[&LOAD_COLUMNS[..], &COLUMNS].concat())?,
         };
+        // With names of its own, the table may have any further columns.
         let [x, y, z] = e.columns.as_ref().map_or(["x", "y", "z"], |own| own.each_ref().map(String::as_str));
         let before = self.measurements.readings.len();
         for row in (0..table.rows.len()).map(|row| TableRow { table: &table, row }) {
@@ -90,6 +94,7 @@ impl Reader<'_> {
             };
             self.add_place(measured, instrument, target)?;
         }
+        // A table in which the instrument saw nothing is a wrong file.
         match self.measurements.readings.len() > before {
             true => Ok(()),
             false => Err(table.error(None, format!("no row has a value of {x}, {y} or {z}")).into()),

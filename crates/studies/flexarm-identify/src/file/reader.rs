@@ -1,4 +1,7 @@
-//! State of reading a file of measurements.
+//! State of reading a file of measurements, with the errors at `path:line:column`.
+//!
+//! The other modules of this folder add one kind of entry each, as `impl Reader`. A [`Site`] is an
+//! entry of the file itself or a row of one of its tables.
 
 use std::ops::Range;
 use std::path::Path;
@@ -56,7 +59,7 @@ impl<'a> From<&Site<'a>> for Site<'a> {
 /// State of the reader.
 pub(crate) struct Reader<'a> {
     pub(crate) cell: &'a Cell<'a>,
-    pub(super) source: &'a Source,
+    pub(crate) source: &'a Source,
     pub(crate) folder: &'a Path,
     pub(crate) units: Units,
     pub(super) targets: Vec<String>,

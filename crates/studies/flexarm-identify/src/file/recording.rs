@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use flexarm_files::{NumberTable, named_file};
+use flexarm_run::toml_file::word;
 use flexarm_run::{Error, RobotFileError};
 use serde::Deserialize;
 use toml::Spanned;
@@ -162,22 +163,17 @@ impl Reader<'_> {
     /// from the controller are left unchanged.
     fn behind_coupling(&self, e: &EncodersEntry, motor: &mut [Vec<f64>]) -> Result<(), Error> {
         let Some(coupling) = self.cell.arm.robot().coupling.as_ref() else { return Ok(()) };
-        match e.positions.as_ref().map(|word| (word.get_ref().as_str(), word)) {
-            Some(("joints", _)) => return Ok(()),
-            Some(("motors", _)) => {}
-            Some((other, word)) => {
-                let text = format!("positions = {other:?} is not known; use \"motors\" or \"joints\"");
-                return Err(self.error(word, text));
-            }
-            None => {
-                let text = format!(
-                    "the gears of {:?} are coupled: state whether motor contains the motor positions after their \
-                     gears (positions = \"motors\") or the joint positions that the controller computes from them \
-                     (positions = \"joints\")",
-                    coupling.joints
-                );
-                return Err(self.error(&e.motor, text));
-            }
+        if e.positions.is_none() {
+            let text = format!(
+                "the gears of {:?} are coupled: state whether motor contains the motor positions after their \
+                 gears (positions = \"motors\") or the joint positions that the controller computes from them \
+                 (positions = \"joints\")",
+                coupling.joints
+            );
+            return Err(self.error(&e.motor, text));
+        }
+        if word(self.source, "positions", &e.positions, &[("motors", false), ("joints", true)])?.1 {
+            return Ok(());
         }
         let place = |joint: &String| self.cell.joints.iter().position(|(name, _)| name == joint);
         let places: Vec<usize> = coupling.joints.iter().filter_map(place).collect();

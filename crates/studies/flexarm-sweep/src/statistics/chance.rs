@@ -41,7 +41,12 @@ const TINY: f64 = 1e-9;
 /// * `columns`: values of each parameter, one for each sample. Samples must be independent of each
 ///   other.
 /// * `y`: the result; samples with a NaN are ignored.
+///
+/// # Panics
+/// Panics if a parameter has fewer values than `y`.
 pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
+    assert!(columns.iter().all(|x| x.len() >= y.len()), "each parameter needs a value per result");
+    // Residuals about the mean, over samples without a NaN.
     let sound = |k: &usize| y[*k].is_finite() && columns.iter().all(|x| x[*k].is_finite());
     let rows: Vec<usize> = (0..y.len()).filter(sound).collect();
     let rows: Vec<usize> = rows.iter().copied().step_by(rows.len().div_ceil(MAX_DRAWS).max(1)).collect();
@@ -52,6 +57,7 @@ pub fn beyond_chance(columns: &[Vec<f64>], y: &[f64]) -> BeyondChance {
     if rows.len() < FEWEST || columns.is_empty() || dot(&residuals, &residuals) <= TINY * TINY * size {
         return found;
     }
+    // Orthonormal columns of each parameter.
     let terms = (rows.len() / DRAWS_PER_TERM).clamp(TERMS.0, TERMS.1);
     let mut bases: Vec<Vec<Vec<f64>>> = columns
         .iter()
@@ -131,6 +137,7 @@ fn orthonormal(columns: Vec<Vec<f64>>, others: &[Vec<f64>]) -> Vec<Vec<f64>> {
     found
 }
 
+/// Returns the scalar product.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -141,6 +148,7 @@ fn remove(from: &mut [f64], q: &[f64]) {
     from.iter_mut().zip(q).for_each(|(x, q)| *x -= part * q);
 }
 
+/// Subtracts the mean.
 fn centre(values: &mut [f64]) {
     let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
     values.iter_mut().for_each(|x| *x -= mean);

@@ -1,4 +1,6 @@
 //! Probability distributions, given by their quantile functions.
+//!
+//! Not here: the points of the unit interval (`sample.rs`), units and bounds of parameters.
 
 use std::f64::consts::SQRT_2;
 
@@ -54,6 +56,7 @@ impl Distribution {
             Self::LogUniform { low, high } => (low.ln() + (high / low).ln() * u).exp(),
             Self::Normal { mean, std } => mean + std * normal_quantile(u),
             Self::LogNormal { median, sigma } => median * (sigma * normal_quantile(u)).exp(),
+            // The distribution function is a parabola on each side of the mode.
             Self::Triangular { low, mode, high } => {
                 let (rise, all) = (mode - low, high - low);
                 match u * all < rise {

@@ -1,4 +1,7 @@
 //! Main effect of a parameter on a result, and the distribution of results.
+//!
+//! Start at [`main_effect`]. Not here: whether an effect exceeds chance ([`super::chance`]),
+//! interactions ([`super::indices`]).
 
 use crate::statistics::indices::quantile;
 
@@ -58,6 +61,7 @@ pub fn main_effect(x: &[f64], y: &[f64], grouping: Grouping) -> Option<MainEffec
     if groups.len() < 2 {
         return None;
     }
+    // Correlation ratio: variance of the group means over that of all results.
     let n = pairs.len() as f64;
     let mean = pairs.iter().map(|p| p.1).sum::<f64>() / n;
     let variance = pairs.iter().map(|p| (p.1 - mean).powi(2)).sum::<f64>() / n;
@@ -86,6 +90,7 @@ fn bins(pairs: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
     groups
 }
 
+/// Returns means and standard error `√(Σ (y - ȳ)² / (n (n - 1)))` of a group.
 fn group(pairs: &[(f64, f64)]) -> EffectGroup {
     let n = pairs.len() as f64;
     let mean = pairs.iter().map(|p| p.1).sum::<f64>() / n;

@@ -43,6 +43,7 @@ pub fn sobol_indices(y: &[f64], dimensions: usize, seed: u64) -> Option<Vec<Sobo
     if sound.len() < FEWEST || dimensions == 0 {
         return None;
     }
+    // Estimates from all base points, and from resamples of them for the intervals.
     let all: Vec<usize> = (0..sound.len()).collect();
     let found = estimate(&sound, &all, dimensions)?;
     let mut drawn: Vec<Vec<[f64; 2]>> = vec![Vec::with_capacity(DRAWS); dimensions];
@@ -91,7 +92,7 @@ fn estimate(bases: &[&[f64]], rows: &[usize], dimensions: usize) -> Option<Vec<[
     Some((0..dimensions).map(of).collect())
 }
 
-/// Returns a quantile of sorted values by linear interpolation.
+/// Returns a quantile of sorted values by linear interpolation; NaN without values.
 pub(crate) fn quantile(sorted: &[f64], part: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let place = part * last as f64;

@@ -1,4 +1,8 @@
 //! Sampling designs: points in a unit cube, each determined by its number.
+//!
+//! Start at [`Sample::coordinate`]. A point depends on seed and number only, so that runs may finish
+//! in any order and a sweep may be continued. Not here: the sequence itself (`sobol.rs`), and the map
+//! from the unit interval to values of a parameter (`distribution.rs`).
 
 use rand::seq::SliceRandom;
 

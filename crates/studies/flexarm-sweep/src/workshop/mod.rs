@@ -94,6 +94,7 @@ impl Workshop {
             reduced: Mutex::default(),
             links_folder: PathBuf::from("links"),
         };
+        // Files that the study names, and the jobs of reduced links.
         let named = [
             (TargetFile::Robot, Some(&file.robot)),
             (TargetFile::Motion, file.motion.as_ref()),
@@ -195,6 +196,7 @@ impl Workshop {
         Some(robot.parent().unwrap_or(Path::new(".")).join(own))
     }
 
+    /// Reads a file once.
     fn read(&mut self, path: &Path, place: &RobotFileError) -> Result<(), Error> {
         if self.texts.contains_key(path) {
             return Ok(());
@@ -234,6 +236,7 @@ impl Workshop {
         Ok(())
     }
 
+    /// Checks that all listed values of a parameter fit one of its targets, and reads the files they name.
     fn check_target(
         &mut self,
         target: &Target,
@@ -248,6 +251,7 @@ impl Workshop {
             Values::Spread(distribution) => vec![ParameterValue::Number(distribution.quantile(0.5))],
             Values::Derived(_) => vec![ParameterValue::Number(1.0)],
         };
+        // Of a distribution the median, of an expression any number.
         for value in &listed {
             match target {
                 Target::File(which) => match value {
@@ -324,6 +328,7 @@ impl Workshop {
     }
 }
 
+/// Returns the message about a path into a file that the study does not name.
 fn no_file(path: &str) -> String {
     format!("{path:?}: the study names no file of this kind")
 }

@@ -1,4 +1,7 @@
 //! Robot, motion, loads and reduced links of a run, built from its files or shared with other runs.
+//!
+//! Start at `Workshop::ready`. Robots and motions are cached by the text that determines them, so
+//! that runs with equal files share them.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};

@@ -1,4 +1,8 @@
 //! Files of a run as they would be written by hand: the edits that its values make in the texts.
+//!
+//! Start at `Workshop::run_files`. A value changes an entry, chooses a file, or sets the speed or
+//! an option; edits of one file follow each other. Not here: reading the files
+//! ([`super::prepare`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -87,6 +91,7 @@ impl Workshop {
 
     /// Returns the files and options of a run.
     fn chosen(&self, values: &[ParameterValue]) -> Result<RunInputs, Error> {
+        // Start from what the study names; each value replaces a file, the speed or an option.
         let mut words = [Some(self.robot.clone()), self.motion.clone(), self.loads.clone()];
         let (mut options, mut given) = (self.options.clone(), self.given_options.clone());
         let mut speed: Option<f64> = None;
@@ -112,6 +117,7 @@ impl Workshop {
                 }
             }
         }
+        // Paths of the files so chosen.
         let path_of = |which: TargetFile| {
             let word = words[word_place(which)].clone()?;
             self.called.get(&(which, word)).cloned()
