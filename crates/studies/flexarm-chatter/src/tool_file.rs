@@ -16,7 +16,7 @@ use toml::Spanned;
 
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::{parsed, word};
-use flexarm_run::{Error, RobotFileError};
+use flexarm_run::Error;
 
 /// Contents of the file as written.
 #[derive(Debug, Deserialize)]
