@@ -193,7 +193,13 @@ fn corners_are_told_and_can_be_rounded() {
     // The energy of the velocity jumps is in the balance.
     let imbalance = sharp["energy"]["imbalance"].as_f64().unwrap();
     assert!(imbalance < 0.02, "{}", sharp["energy"]);
-    place.refused(&[&line[..], &["--round-corners", "0"]].concat(), &["corners", "positive"]);
+    // Nothing to round, and blends in milliseconds.
+    assert!(!round["caveats"].to_string().contains("no-corners"), "{}", round["caveats"]);
+    let smooth = place.json(&["compare", &robot, "--no-files", "--round-corners", "0.1"]);
+    assert!(smooth["caveats"].to_string().contains("no-corners"), "{}", smooth["caveats"]);
+    for seconds in ["0", "50"] {
+        place.refused(&[&line[..], &["--round-corners", seconds]].concat(), &["corners", "that of the motion"]);
+    }
 }
 
 /// Joint efforts of the shipped arms, by a stepper whose constraint forces are the joint forces,

@@ -56,7 +56,10 @@ fn a_run_names_the_flags_that_mend_it() {
             (&["--step", "-1"], "--step: the step must be positive, found -1 s"),
             (&["--log-rate", "-1"], "--log-rate: the log rate must be positive, found -1 Hz"),
             (&["--settling-band", "0"], "--settling-band: the settling band must be positive, found 0 m"),
-            (&["--round-corners", "-1"], "corners are rounded within a positive time, found -1 s: try 0.02"),
+            (
+                &["--round-corners", "-1"],
+                "corners are rounded within a time between 0 and that of the motion (1 s), found -1 s: try 0.02",
+            ),
             (&["--links", "modal", "--segments", "3"], not_lumped),
             (
                 &["--links", "lumped", "--modes", "3"],

@@ -242,18 +242,29 @@ impl Motion {
         Ok(Self { tool_path: None, ..self.with_trajectory(trajectory, model) })
     }
 
-    /// Replaces each corner, where a velocity jumps, by a blend of duration `seconds`.
+    /// Replaces each corner, where a velocity jumps, by a blend of duration `seconds`; a note says
+    /// where there is no corner.
     ///
     /// # Errors
-    /// [`Error::Value`] unless `seconds` is positive, [`Error::Trajectory`] if values overflow.
+    /// [`Error::Value`] unless `seconds` is positive and shorter than the motion,
+    /// [`Error::Trajectory`] if values overflow.
     pub fn with_rounded_corners(self, seconds: f64, model: &Model) -> Result<Self, Error> {
-        if !(seconds > 0.0 && seconds.is_finite()) {
+        let duration = self.trajectory.duration();
+        if !(seconds > 0.0 && seconds < duration) {
             return Err(Error::Value(format!(
-                "corners are rounded within a positive time, found {seconds} s: try 0.02"
+                "corners are rounded within a time between 0 and that of the motion ({duration} s), found {seconds} s: \
+                 try 0.02"
             )));
         }
+        let sharp = self.trajectory.velocity_jumps().iter().any(|jump| jump.time_s > 0.0 && jump.time_s < duration);
         let trajectory = self.trajectory.with_rounded_corners(seconds)?;
-        Ok(self.with_trajectory(trajectory, model))
+        let mut motion = self.with_trajectory(trajectory, model);
+        if !sharp {
+            let file = motion.path.display().to_string();
+            let message = format!("{file}: no velocity jumps along the motion, so there is no corner to round");
+            motion.notes.push(Finding::warning("no-corners", file, message, "").as_note());
+        }
+        Ok(motion)
     }
 
     /// Returns the caveats about the motion.
