@@ -373,12 +373,12 @@ fn range(
     }
     // Equal differences or ratios; the last value is exactly the end.
     let steps = match &own.count {
-        Some(steps) => count(steps, "count", 1, source)?,
+        Some(steps) => count(steps, "count", 2, source)?,
         None => USUAL_STEPS,
     };
     let at = |k: usize| {
-        let part = if steps > 1 { k as f64 / (steps - 1) as f64 } else { 0.0 };
-        match (k + 1 == steps && steps > 1, logarithmic) {
+        let part = k as f64 / (steps - 1) as f64;
+        match (k + 1 == steps, logarithmic) {
             (true, _) => to,
             (false, true) => from * (to / from).powf(part),
             (false, false) => from + (to - from) * part,

@@ -294,6 +294,9 @@ fn what_is_wrong_in_a_study_is_told_with_line_and_what_is_near() {
     };
     let parameter = |text: &str| format!("[[parameter]]\n{text}\n");
     fails(&parameter("path = \"payload.mass\"\nfrom = 1.0"), &["study.toml:4:", "from = ... and to = ..."]);
+    // One value of a range would leave out its end.
+    let one = parameter("path = \"payload.mass\"\nfrom = 1.0\nto = 2.0\ncount = 1");
+    fails(&one, &["study.toml:", "count = 1: expected a whole number from 2"]);
     fails(
         &parameter("path = \"paylod.mass\"\nvalues = [1.0]"),
         &["study.toml:4:1", "matches no entry", "did you mean \"payload.mass\"?"],
