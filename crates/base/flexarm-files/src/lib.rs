@@ -32,6 +32,6 @@ mod yaml;
 pub use error::{FileError, taken};
 pub use number_table::NumberTable;
 pub use results::{Partial, Undo, check_apart, check_free, file_stem, private_folder, write_all, writing_unless};
-pub use text::{Source, TextFileError, named_file, read_text};
+pub use text::{Source, TextFileError, named_file, read_file, read_text};
 pub use unpacked::most_unpacked;
 pub use yaml::{YamlError, YamlNode, YamlValue, read_yaml};

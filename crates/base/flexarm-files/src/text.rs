@@ -26,6 +26,26 @@ pub fn named_file(key: &str, file: &Path, folder: &Path) -> Result<PathBuf, Stri
     }
 }
 
+/// Reads a file of at most `largest` bytes: a regular one, since devices may be endless, and pipes
+/// may block.
+///
+/// # Errors
+/// The error of the operating system; `Other` if the path is not a regular file, `FileTooLarge` if
+/// it has more bytes.
+pub fn read_file(path: &Path, largest: u64) -> std::io::Result<Vec<u8>> {
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("this is not a file; give the path of a regular one"));
+    }
+    let mut bytes = Vec::new();
+    // One byte more than allowed, to detect a larger file.
+    std::fs::File::open(path)?.take(largest + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > largest {
+        let what = format!("more than {largest} bytes, the limit");
+        return Err(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what));
+    }
+    Ok(bytes)
+}
+
 /// Reads the text of a file.
 ///
 /// # Errors
@@ -33,22 +53,12 @@ pub fn named_file(key: &str, file: &Path, folder: &Path) -> Result<PathBuf, Stri
 /// is not UTF-8 text.
 pub fn read_text(path: &Path) -> Result<String, FileError> {
     let fail = |what: String| FileError::Unusable { path: path.to_owned(), what };
-    let unreadable = |error: std::io::Error| match error.kind() {
-        std::io::ErrorKind::InvalidData => {
-            fail("cannot be read: it is not text in UTF-8; save it as that, or is it another file?".into())
-        }
+    let bytes = read_file(path, LARGEST).map_err(|error| match error.kind() {
+        std::io::ErrorKind::FileTooLarge => fail(format!("has more than {LARGEST} bytes, the limit")),
         _ => fail(format!("cannot be read: {error}")),
-    };
-    // Devices may be endless, and pipes may block.
-    if !std::fs::metadata(path).map_err(unreadable)?.is_file() {
-        return Err(fail("cannot be read: this is not a file; give the path of a regular one".into()));
-    }
-    let mut text = String::new();
-    let size = std::fs::File::open(path).and_then(|file| file.take(LARGEST + 1).read_to_string(&mut text));
-    if size.map_err(unreadable)? as u64 > LARGEST {
-        return Err(fail(format!("has more than {LARGEST} bytes, the limit")));
-    }
-    Ok(text)
+    })?;
+    let not_text = "cannot be read: it is not text in UTF-8; save it as that, or is it another file?";
+    String::from_utf8(bytes).map_err(|_| fail(not_text.into()))
 }
 
 /// Error in a text file, with its position.

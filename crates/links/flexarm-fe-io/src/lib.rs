@@ -30,6 +30,7 @@
 mod error;
 pub mod exchange;
 pub mod mesh;
+mod number;
 mod unpack;
 
 pub use unpack::{UnpackError, unpack_gzip};
@@ -46,11 +47,12 @@ pub mod internals {
     pub use crate::exchange::matrix_market::parse as parse_matrix_market;
     pub use crate::exchange::position::ErrorPosition;
     pub use crate::exchange::read::other_names;
-    pub use crate::exchange::text::{Text, real};
+    pub use crate::exchange::text::Text;
     pub use crate::mesh::gmsh::collector::Collector;
     pub use crate::mesh::gmsh::shapes::shape;
     pub use crate::mesh::ids::IdIndex;
     pub use crate::mesh::inp::types::class;
     pub use crate::mesh::source::Source;
+    pub use crate::number::real;
     pub use crate::unpack::{allowed_unpacked, unpacked};
 }

@@ -1,9 +1,12 @@
 //! Unpacks compressed files into memory with a size limit: a few kilobytes of gzip can expand to
 //! gigabytes.
 
+use std::borrow::Cow;
 use std::io::Read;
 
 use flate2::read::MultiGzDecoder;
+
+use crate::error::{FeFileError, FilePosition};
 
 /// Unpacked size that is always allowed, bytes.
 const ALWAYS_UNPACKED: u64 = 64 << 20;
@@ -53,6 +56,19 @@ pub fn unpacked(packed: &[u8], largest: u64) -> Result<Vec<u8>, UnpackError> {
         });
     }
     Ok(bytes)
+}
+
+/// Returns the bytes of a file, unpacked if they are compressed with gzip; `origin` names the file.
+///
+/// # Errors
+/// [`FeFileError`] as [`unpack_gzip`], also above `largest` bytes.
+pub(crate) fn plain<'b>(bytes: &'b [u8], origin: &str, largest: u64) -> Result<Cow<'b, [u8]>, FeFileError> {
+    if !is_gzip(bytes) {
+        return Ok(Cow::Borrowed(bytes));
+    }
+    unpacked(bytes, largest).map(Cow::Owned).map_err(|error| {
+        FeFileError::new(origin, FilePosition::File, "gzip data", error.found, error.expected).help(error.help)
+    })
 }
 
 /// Unpacks gzip bytes, up to the size that is plausible for the packed size.

@@ -22,7 +22,7 @@ fn cube_and(more: &str) -> Result<MeshFile, FeFileError> {
 #[test]
 fn keywords_are_read_in_any_case_with_blanks_comments_and_fortran_numbers() {
     let text = "** a comment\r\n*Heading\r\n any, text\r\n* node , nset = \"All Nodes\"\r\n1, 0., 0.d0, 0\r\n2, 1.0D+00,,\r\n\
-                ** between\r\n3, 0, 1\r\n4, 0, 0, 1e0,\r\n\r\n*Element, Type = c3d4,\r\n ElSet=Body\r\n5, 1, 2,\r\n3, 4\r\n";
+                ** between\r\n3, 0, 1\r\n4, 0, 0, 1.0+0,\r\n\r\n*Element, Type = c3d4,\r\n ElSet=Body\r\n5, 1, 2,\r\n3, 4\r\n";
     let mesh = read(text).unwrap().mesh;
     assert_eq!(mesh.nodes, [Vector3::zeros(), Vector3::x(), Vector3::y(), Vector3::z()]);
     assert_eq!((mesh.blocks[0].ids[0], &mesh.blocks[0].connectivity[..]), (5, &[0, 1, 2, 3][..]));

@@ -1,4 +1,7 @@
 //! Creation of a recording's file, and the times of its flushes.
+//!
+//! Start at [`CreateOptions`]. The clock decides when bytes reach the disk, never which bytes.
+//! Not here: files that are complete or absent ([`crate::whole_file`]).
 
 use std::fs::{File, OpenOptions};
 use std::io;

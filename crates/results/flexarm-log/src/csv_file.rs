@@ -1,4 +1,7 @@
 //! Scalars of a run as one table: SI units, one row per sample, units in the column names.
+//!
+//! Start at [`CsvRecorder`]. The file always ends with a whole line, even on a full disk.
+//! Not here: choice and order of the columns ([`crate::table`]), reading ([`crate::read`]).
 
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};

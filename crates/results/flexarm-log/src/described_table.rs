@@ -82,7 +82,7 @@ impl Block {
 pub(crate) struct DescribedTable {
     pub(crate) layout: TableLayout,
     pub(crate) result: RunResult,
-    /// Whether the file holds a run header ([`RUN_KEY`]).
+    /// Whether the file has a run header ([`RUN_KEY`]).
     pub(crate) described: bool,
 }
 
@@ -98,9 +98,9 @@ impl DescribedTable {
         let mut attachments: Vec<Attachment> = texts.iter().filter_map(attached).collect();
         let refuse = |(found, expected)| not_a_recording(path, found, expected);
         let layout = match value(RUN_KEY).map(|text| run_json::read(text.as_bytes())) {
-            Some(Ok((header, run))) => {
+            Some(Ok((header, order, _))) => {
                 // Other writers do not keep the order of the texts.
-                attachments.sort_by_key(|file| run.attachments.iter().position(|name| *name == file.name));
+                attachments.sort_by_key(|file| order.iter().position(|name| *name == file.name));
                 TableLayout::of_header(header, names)
             }
             Some(Err(error)) => Err((error.to_string(), "the description of a run".to_owned())),

@@ -1,4 +1,7 @@
 //! Errors of writing and reading a run. Every message starts with the file.
+//!
+//! Start at [`LogError`]. Not here: faults inside a format, which become [`LogError::Format`] or
+//! [`LogError::NotARecording`] in its module.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -28,7 +31,7 @@ pub enum LogError {
         source: io::Error,
     },
 
-    /// The format cannot hold the data.
+    /// The data do not fit into the format.
     #[error("{}: cannot {action}: {cause}", path.display())]
     Format {
         /// The file being written.

@@ -1,4 +1,7 @@
 //! Common part of all recorders: a file created by `begin`, and the check of the order of calls.
+//!
+//! Start at [`FileRecorder`]; a format implements [`OpenFile`]. Not here: the formats, several
+//! files of one run ([`crate::multi`]).
 
 use std::path::{Path, PathBuf};
 

@@ -1,5 +1,7 @@
 //! The columns of a run in memory as the table of its CSV file: one number per column, with the
 //! same names.
+//!
+//! Start at [`flat_columns`]. Not here: names and order of the columns ([`crate::table`]).
 
 use flexarm_sample::{Columns, RunHeader};
 
@@ -44,6 +46,7 @@ fn places(columns: &Columns, has_rigid: bool) -> Vec<ColumnSource> {
     let mut take = |signal, numbers: std::ops::Range<usize>| {
         places.extend(numbers.map(|number| ColumnSource { signal, number }));
     };
+    // TCP of both robots, and its error.
     take("time", 0..1);
     if has_rigid {
         take("rigid_tcp_position", 0..3);
@@ -55,6 +58,7 @@ fn places(columns: &Columns, has_rigid: bool) -> Vec<ColumnSource> {
         take("error_path", 0..3);
         take("error_static", 0..3);
     }
+    // Causes of the error, joints, elastic elements, gauges, energies.
     if columns.column("contribution").is_some() {
         take("contribution", 0..3 * columns.contributors.len());
     }

@@ -1,4 +1,7 @@
 //! Several recordings of one run.
+//!
+//! Start at [`RecorderSet`]. Every file gets the same samples, with or without threads.
+//! Not here: the threads ([`crate::threads`]), one file ([`crate::file_recorder`]).
 
 use std::path::{Path, PathBuf};
 

@@ -2,6 +2,7 @@
 //! animations need fewer poses.
 
 use crate::Sample;
+use crate::trace_blocks::norm;
 
 /// Minimum time between two poses (ns): every sample of a run logged at up to 200 Hz, fewer of
 /// faster ones.
@@ -33,15 +34,11 @@ impl PoseClock {
         if due {
             self.last_ns = Some(since_start_ns);
         }
-        let error_m = size(&sample.error_world[..3]);
+        let error_m = norm(&sample.error_world[..3]);
         let new_peak = has_rigid && self.largest_m.is_none_or(|largest| error_m > largest);
         if new_peak {
             self.largest_m = Some(error_m);
         }
         PoseReasons { due, new_peak }
     }
-}
-
-fn size(parts: &[f64]) -> f64 {
-    parts.iter().map(|part| part * part).sum::<f64>().sqrt()
 }

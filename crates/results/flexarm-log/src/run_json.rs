@@ -1,9 +1,10 @@
 //! A run's header as JSON, and its triangles as one compressed block: data without a topic in a
 //! recording.
 //!
-//! `run.json` is a stable format: keys are added, not renamed. It holds all of a [`RunHeader`]
-//! except the URDF, which recordings contain unchanged, and the vertices of meshes, which are in
-//! `meshes.bin.zst`.
+//! `run.json` is a stable format: keys are added, not renamed. It has all of a [`RunHeader`] except
+//! the URDF, which recordings contain unchanged, and the vertices of meshes, which are in
+//! `meshes.bin.zst`. Start at [`write`] and [`read`].
+//! Not here: messages and tables ([`crate::mcap_file`], [`crate::described_table`]).
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};
@@ -24,9 +25,9 @@ pub(crate) const JSON: &str = "application/json";
 const FORMAT: u32 = 1;
 
 #[derive(Debug, Serialize, Deserialize)]
-pub(crate) struct RunJson {
+struct RunJson {
     /// First in the file, for human readers.
-    pub(crate) format: u32,
+    format: u32,
     robot: String,
     trajectory: String,
     tcp: String,
@@ -59,9 +60,9 @@ pub(crate) struct RunJson {
     /// Groups of key-value pairs, in their order.
     metadata: Vec<(String, Vec<(String, String)>)>,
     /// Names of the attached files, except those of the recorder itself.
-    pub(crate) attachments: Vec<String>,
+    attachments: Vec<String>,
     /// Meshes in the order of `meshes.bin.zst`.
-    pub(crate) meshes: Vec<MeshEntry>,
+    meshes: Vec<MeshEntry>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -92,6 +93,7 @@ pub(crate) struct MeshEntry {
 /// Returns the header as JSON text. `meshes`: whether to list its meshes and the surfaces of the
 /// result, that is whether they are stored beside it.
 pub(crate) fn write(header: &RunHeader, meshes: bool) -> String {
+    // Parts that differ from those of the header.
     let entry = |mesh: &crate::LinkMesh| MeshEntry {
         link: mesh.link,
         name: mesh.name.clone(),
@@ -162,12 +164,14 @@ pub(crate) enum RunJsonError {
     UnknownLink,
 }
 
-/// Reads the header, without URDF, attached files and meshes, which the caller adds.
-pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), RunJsonError> {
-    let mut run: RunJson = serde_json::from_slice(text).map_err(RunJsonError::NotAHeader)?;
+/// Reads the header, without URDF, attached files and meshes, which the caller adds; also returns
+/// the names of the attached files and the list of meshes.
+pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, Vec<String>, Vec<MeshEntry>), RunJsonError> {
+    let run: RunJson = serde_json::from_slice(text).map_err(RunJsonError::NotAHeader)?;
     if run.format > FORMAT {
         return Err(RunJsonError::LaterFormat { found: run.format });
     }
+    // Every index of a link must exist, and a parent must precede its children.
     let links = run.links.len();
     let parents_first = run.links.iter().enumerate().all(|(k, link)| link.parent.is_none_or(|parent| parent < k));
     let in_range = run.meshes.iter().all(|mesh| mesh.link < links)
@@ -183,35 +187,35 @@ pub(crate) fn read(text: &[u8]) -> Result<(RunHeader, RunJson), RunJsonError> {
         carries: bend.carries,
     };
     let header = RunHeader {
-        robot: std::mem::take(&mut run.robot),
-        trajectory: std::mem::take(&mut run.trajectory),
-        tcp: std::mem::take(&mut run.tcp),
-        joints: std::mem::take(&mut run.joints),
-        prismatic: std::mem::take(&mut run.prismatic),
+        robot: run.robot,
+        trajectory: run.trajectory,
+        tcp: run.tcp,
+        joints: run.joints,
+        prismatic: run.prismatic,
         links: run
             .links
-            .drain(..)
+            .into_iter()
             .map(|link| LinkInfo { name: link.name, parent: link.parent, fixed: link.fixed })
             .collect(),
-        elements: std::mem::take(&mut run.elements),
-        contributors: std::mem::take(&mut run.contributors),
-        gauges: std::mem::take(&mut run.gauges),
-        bends: run.bends.drain(..).map(bend).collect(),
+        elements: run.elements,
+        contributors: run.contributors,
+        gauges: run.gauges,
+        bends: run.bends.into_iter().map(bend).collect(),
         has_rigid: run.has_rigid,
         has_static: run.has_static,
         has_stress: run.has_stress,
         log_rate_hz: run.log_rate_hz,
         step_s: run.step_s,
-        captions: run.captions.drain(..).map(|(from_s, text)| crate::Caption { from_s, text }).collect(),
+        captions: run.captions.into_iter().map(|(from_s, text)| crate::Caption { from_s, text }).collect(),
         start_ns: run.start_ns,
         magnification: run.magnification,
         color_scale_m: run.color_scale_m,
         volume: run.volume,
-        description: std::mem::take(&mut run.description),
-        metadata: std::mem::take(&mut run.metadata),
+        description: run.description,
+        metadata: run.metadata,
         ..RunHeader::default()
     };
-    Ok((header, run))
+    Ok((header, run.attachments, run.meshes))
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -272,6 +276,7 @@ pub(crate) fn read_result(text: &str) -> RunResult {
     }
 }
 
+/// Translation (m), then the rotation matrix row by row.
 fn numbers(X: &Pose) -> [f64; 12] {
     let rotation = X.rotation.matrix();
     std::array::from_fn(|k| match k {

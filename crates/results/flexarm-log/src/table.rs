@@ -1,5 +1,9 @@
-//! The table of a run: mapping between the numbers of a sample and columns. CSV, Parquet and Arrow
-//! files share it, for writing and reading.
+//! The table of a run: mapping between the numbers of a sample and columns. CSV and Parquet files
+//! share it, for writing and reading.
+//!
+//! Start at [`columns`] and [`fill_row`]; [`TableLayout`] reads a row back. The order of the
+//! columns is in these three places. SI units; TCP in world axes. Not here: files
+//! ([`crate::csv_file`], `parquet_file`), whole columns ([`crate::flat`]).
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -16,6 +20,7 @@ const POSITION: [&str; 3] = ["x_m", "y_m", "z_m"];
 /// Names of all columns, in the order of [`fill_row`].
 pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
     let position = |who: &str| POSITION.map(|axis| format!("{who}_{axis}"));
+    // TCP of both robots, and its error.
     let mut names = vec!["time".to_owned()];
     if header.has_rigid {
         names.extend(position("rigid"));
@@ -28,6 +33,7 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
     if header.has_rigid && header.has_static {
         names.extend(position("static_error"));
     }
+    // Causes of the error, joints, elastic elements, gauges, energies.
     for contributor in &header.contributors {
         names.extend(POSITION.map(|axis| format!("{contributor}_contribution_{axis}")));
     }
@@ -46,12 +52,14 @@ pub(crate) fn columns(header: &RunHeader) -> Vec<String> {
     names.extend(["kinetic", "potential", "elastic"].map(|kind| format!("{kind}_energy_j")));
     // A link may be named `flexible`: of two equal names the later column gets a suffix.
     let mut taken = BTreeSet::new();
-    let distinct = |name: String| {
-        let numbered = (2..).map(|n| format!("{name}_{n}"));
-        let free = std::iter::once(name.clone()).chain(numbered).find(|name| taken.insert(name.clone()));
-        free.unwrap_or(name)
-    };
-    names.into_iter().map(distinct).collect()
+    names.into_iter().map(|name| distinct(name, &mut taken)).collect()
+}
+
+/// Returns the name, or if it is taken, the name with the first free number (`name_2`).
+pub(crate) fn distinct(name: String, taken: &mut BTreeSet<String>) -> String {
+    let numbered = (2..).map(|n| format!("{name}_{n}"));
+    let free = std::iter::once(name.clone()).chain(numbered).find(|name| taken.insert(name.clone()));
+    free.unwrap_or(name)
 }
 
 /// Replaces `row` by the numbers of a sample, in the order of [`columns`].
@@ -150,6 +158,7 @@ impl TableLayout {
         (header.links, header.meshes) = (Vec::new(), Vec::new());
         header.bends = Vec::new();
         (header.magnification, header.urdf) = (0.0, String::new());
+        // A column of the run must not occur twice.
         let wanted = columns(&header);
         let needed: HashSet<&String> = wanted.iter().collect();
         let mut first_of: HashMap<&String, usize> = HashMap::new();
@@ -182,6 +191,7 @@ impl TableLayout {
     /// Fills a sample from the numbers of a row in the order of [`columns`]. Missing quantities are
     /// NaN; the TCP orientation is that of the world.
     pub(crate) fn sample(&self, row: &[f64], sample: &mut Sample) {
+        // The next number of the row, and three of them as a place.
         let mut next = row.iter().copied();
         let mut number = || next.next().unwrap_or(f64::NAN);
         let joints = self.header.joints.len();
@@ -197,6 +207,7 @@ impl TableLayout {
             Translation3::from(vector).into()
         };
 
+        // TCP of both robots, and its error.
         *sample = Sample {
             time_s: number(),
             flexible: twin(),
@@ -218,6 +229,7 @@ impl TableLayout {
         if self.header.has_rigid && self.header.has_static {
             sample.static_m = std::array::from_fn(|_| number());
         }
+        // Causes of the error, joints, elastic elements, gauges, energies.
         let contribution = |_: &String| std::array::from_fn(|_| number());
         sample.contributions = self.header.contributors.iter().map(contribution).collect();
         for joint in 0..joints {

@@ -5,7 +5,7 @@
 //! same bytes. Start at [`Threads::record`].
 //!
 //! A batch is sent when it is full or when [`PAUSE`] has passed since the last one, so that samples
-//! of a slow run are not held back. When a queue is full the run waits, so memory is bounded
+//! of a slow run are not delayed. When a queue is full the run waits, so memory is bounded
 //! regardless of the length of the run. On a nearly full disk it waits for each batch: then no file
 //! takes the space that another needs for the same samples.
 
@@ -59,11 +59,11 @@ pub(crate) struct Threads {
     workers: Vec<Worker>,
     /// Ring of batches: first the one being filled, then the oldest.
     batches: VecDeque<Arc<Batch>>,
-    handed_over: Instant,
+    sent: Instant,
     /// Folder of the first file, whether its disk is nearly full, and time of that check.
     folder: PathBuf,
     scarce: bool,
-    looked: Instant,
+    checked: Instant,
     /// Whether the result has been sent.
     closed: bool,
 }
@@ -85,7 +85,7 @@ impl Threads {
         let folder = folder_of(recorders.first().map_or(Path::new(""), |recorder| recorder.path())).to_owned();
         let (scarce, now) = (is_scarce(&folder), Instant::now());
         let workers = recorders.into_iter().map(start).collect();
-        Self { workers, batches, handed_over: now, folder, scarce, looked: now, closed: false }
+        Self { workers, batches, sent: now, folder, scarce, checked: now, closed: false }
     }
 
     /// Adds a sample.
@@ -94,7 +94,7 @@ impl Threads {
     /// The first error of a recorder not returned yet; it may belong to an earlier sample.
     pub(crate) fn record(&mut self, sample: &Sample) -> Result<(), LogError> {
         let current = &mut self.batches[0];
-        // No recorder holds this batch any more, since each queue is shorter than the ring. If one
+        // No recorder uses this batch any more, since each queue is shorter than the ring. If one
         // still does, allocate a new batch.
         if Arc::get_mut(current).is_none() {
             *current = Arc::default();
@@ -105,15 +105,15 @@ impl Threads {
                 None => batch.samples.push(sample.clone()),
             }
             batch.used += 1;
-            if batch.used == BATCH || self.handed_over.elapsed() >= PAUSE {
-                self.hand_over();
+            if batch.used == BATCH || self.sent.elapsed() >= PAUSE {
+                self.send();
             }
         }
         self.unreported().map_or(Ok(()), Err)
     }
 
     /// Sends the batch to all recorders and begins the next.
-    fn hand_over(&mut self) {
+    fn send(&mut self) {
         if self.batches[0].used == 0 {
             return;
         }
@@ -121,9 +121,9 @@ impl Threads {
             // The error of a thread that has ended is returned by `join`.
             let _ = worker.queue.send(Message::Samples(self.batches[0].clone()));
         }
-        self.handed_over = Instant::now();
-        if self.handed_over - self.looked >= POLL_INTERVAL {
-            (self.scarce, self.looked) = (is_scarce(&self.folder), self.handed_over);
+        self.sent = Instant::now();
+        if self.sent - self.checked >= POLL_INTERVAL {
+            (self.scarce, self.checked) = (is_scarce(&self.folder), self.sent);
         }
         if self.scarce {
             self.wait();
@@ -150,7 +150,7 @@ impl Threads {
         if std::mem::replace(&mut self.closed, true) {
             return;
         }
-        self.hand_over();
+        self.send();
         let result = Arc::new(result.clone());
         for worker in &self.workers {
             let _ = worker.queue.send(Message::Finish(result.clone()));
@@ -186,7 +186,7 @@ impl Drop for Threads {
         if self.workers.is_empty() {
             return;
         }
-        self.hand_over();
+        self.send();
         for Worker { queue, thread, .. } in self.workers.drain(..) {
             drop(queue);
             let _ = thread.join(); // the recorder is dropped with the thread and closes its file

@@ -1,6 +1,11 @@
 //! A run in memory: the data for reports, overlays and conversions.
+//!
+//! Start at [`Trace::push`]; a reader of a recording is a [`RunSource`]. SI units, positions and
+//! errors of the TCP in world axes.
+//! Not here: minimum and maximum of blocks ([`crate::trace_blocks`]), every number of a run
+//! ([`crate::Columns`]).
 
-use crate::trace_blocks::{Blocks, CurveQuantity};
+use crate::trace_blocks::{Blocks, CurveQuantity, norm};
 use crate::{Event, LogError, RunHeader, RunResult, Sample};
 
 /// A run as columns of scalars, with the sample of the maximum error.
@@ -29,7 +34,7 @@ pub struct Trace {
     /// Data known at the end.
     pub result: RunResult,
     stride: u64,
-    seen: u64,
+    samples: u64,
     without_curves: bool,
     for_page: bool,
     peak_error: f64,
@@ -78,11 +83,9 @@ pub struct TraceRow {
 impl TraceRow {
     /// Norm of the TCP error (m).
     pub fn error_m(&self) -> f64 {
-        size(&self.error_world)
+        norm(&self.error_world[..3])
     }
-}
 
-impl TraceRow {
     /// Copies the numbers of a sample, reusing the memory of the lists.
     fn fill(&mut self, sample: &Sample) {
         self.time_s = sample.time_s;
@@ -112,8 +115,13 @@ fn translation(row: &TraceRow) -> (f64, [f64; 3]) {
     (row.time_s, [0, 1, 2].map(|c| row.error_world[c]))
 }
 
-fn size(error: &[f64; 6]) -> f64 {
-    error[..3].iter().map(|part| part * part).sum::<f64>().sqrt()
+/// Keeps the first of every two entries.
+pub(crate) fn halve<T>(list: &mut Vec<T>) {
+    let mut keep = false;
+    list.retain(|_| {
+        keep = !keep;
+        keep
+    });
 }
 
 impl Trace {
@@ -146,15 +154,17 @@ impl Trace {
 
     /// Adds a sample.
     pub fn push(&mut self, sample: &Sample) {
-        let error = size(&sample.error_world);
+        // Sample of the maximum error.
+        let error = norm(&sample.error_world[..3]);
         if error > self.peak_error {
             self.peak_error = error;
             self.peak.clone_from(sample);
         }
-        self.seen += 1;
+        self.samples += 1;
         if self.without_curves {
             return;
         }
+        // A short run keeps every row.
         if self.blocks.is_empty() && self.rows.len() < Self::WHOLE {
             self.rows.push(TraceRow::from(sample));
             return;
@@ -162,20 +172,17 @@ impl Trace {
         if self.blocks.is_empty() {
             self.shorten();
         }
+        // A long run has blocks for its curves, its first errors, and evenly spaced rows.
         self.row.fill(sample);
         self.blocks.push(&self.row);
         if self.beginning.len() < Self::BEGINNING {
             self.beginning.push(translation(&self.row));
         }
-        if (self.seen - 1).is_multiple_of(self.stride.max(1)) {
+        if (self.samples - 1).is_multiple_of(self.stride.max(1)) {
             self.rows.push(self.row.without_lists());
         }
         if self.rows.len() >= self.limit() {
-            let mut keep = false;
-            self.rows.retain(|_| {
-                keep = !keep;
-                keep
-            });
+            halve(&mut self.rows);
             self.stride = self.stride.max(1) * 2;
         }
     }
@@ -220,7 +227,7 @@ impl Trace {
         let step = |row: &TraceRow| {
             let way: [f64; 3] = std::array::from_fn(|k| row.rigid_m[k] - last[k]);
             last = row.rigid_m;
-            length += way.iter().map(|part| part * part).sum::<f64>().sqrt();
+            length += norm(&way);
             length
         };
         self.rows.iter().map(step).collect()
@@ -242,7 +249,7 @@ impl Trace {
 
     /// Number of samples pushed, kept or not.
     pub fn samples(&self) -> u64 {
-        self.seen
+        self.samples
     }
 
     /// Number of samples per row: 1 for a run that is not thinned, otherwise a power of two.

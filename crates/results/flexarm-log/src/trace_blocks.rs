@@ -1,7 +1,7 @@
 //! Curves of a long run: minimum and maximum of each block of samples.
 //!
 //! Start at [`Blocks::push`]. Memory does not grow with the run: when there are too many blocks,
-//! pairs are merged.
+//! pairs are merged. Not here: short runs, whose samples are all kept ([`crate::trace`]).
 
 use crate::{ElasticSample, TraceRow};
 
@@ -126,7 +126,8 @@ impl CurveQuantity {
     }
 }
 
-fn norm(v: &[f64]) -> f64 {
+/// Euclidean norm.
+pub(crate) fn norm(v: &[f64]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
@@ -162,8 +163,10 @@ impl Blocks {
         if self.is_empty() {
             (self.quantities, self.size, self.last_m) = (CurveQuantity::all(row), 1, row.rigid_m);
         }
+        // Path length of the rigid TCP.
         self.way += norm(&[0, 1, 2].map(|c| row.rigid_m[c] - self.last_m[c]));
         self.last_m = row.rigid_m;
+        // The first sample of a block.
         if self.is_empty() || self.filled == self.size {
             if self.times.len() == MAX_BLOCKS {
                 self.halve();
@@ -176,6 +179,7 @@ impl Blocks {
             }
             self.filled = 0;
         }
+        // Ranges of the block.
         self.filled += 1;
         let last = self.times.len() - 1;
         (self.times[last][1], self.ways[last][1]) = (row.time_s, self.way);

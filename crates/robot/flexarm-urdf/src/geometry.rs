@@ -6,11 +6,10 @@
 use std::path::PathBuf;
 
 use flexarm_kinematics::Pose;
+use flexarm_settings::Finding;
 use nalgebra::{Matrix3, Vector3};
 
-use flexarm_settings::Finding;
-
-use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_mesh_with};
+use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_mesh};
 
 /// A shape on a link.
 #[derive(Clone, Debug, PartialEq)]
@@ -81,7 +80,7 @@ impl Geometry {
     /// Finding about the file of a mesh.
     pub fn triangles(&self) -> Result<TriangleMesh, Box<Finding>> {
         Ok(match self {
-            Self::Mesh { path: Some(path), scale, up_axis, .. } => load_mesh_with(path, *up_axis)?.scaled(scale),
+            Self::Mesh { path: Some(path), scale, up_axis, .. } => load_mesh(path, *up_axis)?.scaled(scale),
             Self::Mesh { uri, path: None, .. } => {
                 let message = format!("no file was found for {uri:?}");
                 return Err(Box::new(Finding::error("mesh", "", message, "")));

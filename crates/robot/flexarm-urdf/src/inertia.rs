@@ -4,20 +4,16 @@
 //! Frames: L link, I the axes of `<inertial>`, R the root link of a moving body (links fixed to
 //! each other).
 //!
-//! ```text
-//! c = p_LoLcm_L,   I_com_L = R_LI I_com_I R_LIᵀ
-//! ```
 //! Start at [`link_inertias`]. Checks refer to the centre of mass and are relative to the largest
-//! principal moment.
+//! principal moment. Not here: volumes of meshes ([`crate::mesh`]), bodies ([`crate::tree`]).
 
-use flexarm_kinematics::{LinkInertia, Pose, SpatialInertia, moment_floor};
-use flexarm_settings::{Finding, Setting};
+use flexarm_kinematics::{LinkInertia, SpatialInertia, moment_floor};
+use flexarm_settings::{Finding, Setting, closest};
 use nalgebra::{Matrix3, Vector3};
 
-use crate::mesh::MassProperties;
 use crate::raw::{RawInertial, RawLink, RawRobot};
 use crate::read::{InertiaEstimate, ReadOptions};
-use crate::report::{Report, quoted};
+use crate::report::{Report, did_you_mean, quoted};
 use crate::shapes::LinkShape;
 use crate::tree::Body;
 
@@ -39,15 +35,15 @@ pub(crate) fn link_inertias(
 ) -> Vec<Option<LinkInertia>> {
     let mut inertias: Vec<Option<LinkInertia>> =
         robot.links.iter().map(|l| l.inertial.as_ref().map(in_link_axes)).collect();
-    let unknown = "the inertia check is waived for";
-    check_names(robot, &options.waive, unknown, "waived-unknown-link", report);
-    check_names(robot, &options.discard, "the inertia is discarded of", "discarded-unknown-link", report);
+    let (waived, discarded) = ("the inertia check is waived for", "the inertia is discarded of");
+    check_names(robot, &options.waive, waived, "waived-unknown-link", report);
+    check_names(robot, &options.discard, discarded, "discarded-unknown-link", report);
     let failures = match options.inertia_from_mesh {
         Some(estimate) => fill_from_shapes(robot, bodies, shapes, estimate, &mut inertias, report),
         None => vec![None; robot.links.len()],
     };
 
-    // Checks each link. Links on the base do not affect the motion, so warnings suffice.
+    // Each link. Links on the base do not affect the motion, so warnings suffice.
     let mut moves = vec![true; robot.links.len()];
     for body in bodies.iter().filter(|b| b.moved_by.is_none()) {
         body.members.iter().for_each(|&(link, _)| moves[link] = false);
@@ -74,11 +70,12 @@ pub(crate) fn link_inertias(
         }
     }
 
+    // Each moving body.
     let mut massless = Vec::new();
     for body in bodies.iter().filter(|b| b.moved_by.is_some()) {
         massless.extend(check_body(robot, body, &inertias, &without_extent, &failures, options, report));
     }
-    tell_massless(robot, massless, report);
+    warn_massless(robot, massless, report);
     // An <inertial> of zeros denotes a massless frame.
     for inertia in &mut inertias {
         if inertia.is_some_and(|i| i.mass == 0.0 && i.inertia_com == Matrix3::zeros()) {
@@ -88,14 +85,15 @@ pub(crate) fn link_inertias(
     inertias
 }
 
+/// Returns the inertia about the centre of mass in L: `I_com_L = R_LI I_com_I R_LIᵀ`.
 fn in_link_axes(raw: &RawInertial) -> LinkInertia {
     let R_LI = raw.X_LI.rotation.matrix();
-    let inertia = R_LI * raw.inertia_I * R_LI.transpose();
+    let I_com_L = R_LI * raw.inertia_I * R_LI.transpose();
     LinkInertia {
         mass: raw.mass,
         com: raw.X_LI.translation.vector,
         // Rounding makes the product slightly unsymmetric.
-        inertia_com: (inertia + inertia.transpose()) * 0.5,
+        inertia_com: (I_com_L + I_com_L.transpose()) * 0.5,
     }
 }
 
@@ -103,9 +101,8 @@ fn in_link_axes(raw: &RawInertial) -> LinkInertia {
 fn check_names(robot: &RawRobot, names: &[String], what: &str, code: &'static str, report: &mut Report) {
     for name in names.iter().filter(|name| robot.links.iter().all(|l| l.name != **name)) {
         let message = format!("{what} link {name:?}, which does not exist");
-        let help = flexarm_settings::closest(name, robot.links.iter().map(|l| l.name.as_str()));
-        let help = help.map_or_else(String::new, |meant| format!("did you mean {meant:?}?"));
-        report.warning(&robot.place, code, message, help);
+        let meant = closest(name, robot.links.iter().map(|l| l.name.as_str()));
+        report.warning(&robot.place, code, message, did_you_mean(meant, ""));
     }
 }
 
@@ -141,7 +138,7 @@ fn check_moments(
     let floor = moment_floor(raw.mass, scale);
     let found = moments.map(|m| format!("{m:.6e}")).join(", ");
     let (code, message, help) = if low.is_nan() || low < -floor {
-        // no waiver for moving links: a negative moment would add energy
+        // No waiver for moving links: a negative moment would add energy.
         (
             "inertia-not-positive-definite",
             format!("the inertia of link {name:?} is not positive definite: principal moments {found} kg m^2"),
@@ -177,7 +174,7 @@ fn check_moments(
 
 /// Warns about joints that move no mass, whose inertia is missing in the results. Many such joints
 /// give one warning.
-fn tell_massless(robot: &RawRobot, massless: Vec<(&str, Finding)>, report: &mut Report) {
+fn warn_massless(robot: &RawRobot, massless: Vec<(&str, Finding)>, report: &mut Report) {
     const MAX: usize = 3;
     if massless.len() <= MAX {
         report.take(massless.into_iter().map(|(_, warning)| warning));
@@ -235,6 +232,7 @@ fn check_body<'r>(
     if with_inertia.iter().any(unsound) {
         return None;
     }
+    // Spatial inertia of the body about Ro, in R.
     let mut M_R = SpatialInertia::zeros();
     for (i, X_RL) in &body.members {
         if let Some(inertia) = &inertias[*i] {
@@ -306,19 +304,13 @@ fn fill_from_shapes(
     report: &mut Report,
 ) -> Vec<Option<String>> {
     let mut failures = vec![None; robot.links.len()];
-    let (what, value) = match estimate {
-        InertiaEstimate::Density(density) => ("the density", density),
-        InertiaEstimate::TotalMass(mass) => ("the total mass", mass),
-    };
-    if !(value > 0.0 && value.is_finite()) {
-        let message = format!("inertia from meshes was requested with {what} {value}, expected a positive number");
-        let help = "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg";
-        report.error(&robot.place, "bad-estimate", message, help);
+    if !is_positive(estimate, robot, report) {
         return failures;
     }
-
-    // The base is included, so that the total mass may be that of the data sheet.
-    let empty: Vec<usize> = links_without(robot, bodies).collect();
+    // Volumes of the links of bodies without any `<inertial>`. The base is included, so that the
+    // total mass may be that of the data sheet.
+    let without = bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()));
+    let empty: Vec<usize> = without.flat_map(|b| b.members.iter().map(|m| m.0)).collect();
     let mut filled: Vec<(usize, SpatialInertia)> = Vec::new();
     for &i in &empty {
         match of_shapes(&robot.links[i], &shapes[i], report) {
@@ -327,6 +319,7 @@ fn fill_from_shapes(
         }
     }
 
+    // Without any shape, the lengths of the links distribute a total mass.
     let by_length = filled.is_empty() && matches!(estimate, InertiaEstimate::TotalMass(_));
     if by_length {
         filled = empty.iter().filter_map(|&i| Some((i, rod(robot, i)?))).collect();
@@ -336,7 +329,7 @@ fn fill_from_shapes(
         let has_no_shape = |i: &usize| shapes[*i].solids.as_ref().is_ok_and(Vec::is_empty);
         empty.into_iter().filter(has_no_shape).for_each(|i| failures[i] = Some("there is no shape".to_owned()));
     }
-    // For rods the "volume" is the length.
+    // Density that gives the total mass; for rods the "volume" is the length.
     let volume: f64 = filled.iter().map(|(_, M)| M.mass).sum();
     let density = match estimate {
         InertiaEstimate::Density(density) => density,
@@ -361,6 +354,21 @@ fn fill_from_shapes(
     failures
 }
 
+/// Whether the requested density or mass is positive; reports others.
+fn is_positive(estimate: InertiaEstimate, robot: &RawRobot, report: &mut Report) -> bool {
+    let (what, value) = match estimate {
+        InertiaEstimate::Density(density) => ("the density", density),
+        InertiaEstimate::TotalMass(mass) => ("the total mass", mass),
+    };
+    let positive = value > 0.0 && value.is_finite();
+    if !positive {
+        let message = format!("inertia from meshes was requested with {what} {value}, expected a positive number");
+        let help = "give a density in kg/m^3 (steel 7850, aluminium 2700) or a mass in kg";
+        report.error(&robot.place, "bad-estimate", message, help);
+    }
+    positive
+}
+
 /// Warns of a density of all shapes that no arm has; `first`: the first link with a shape.
 fn check_density(first: &RawLink, volume: f64, density: f64, report: &mut Report) {
     if SOLID.contains(&density) {
@@ -375,42 +383,36 @@ fn check_density(first: &RawLink, volume: f64, density: f64, report: &mut Report
     report.warning(&first.place, "estimated-density", message, help);
 }
 
-/// Returns the inertia of the shapes of a link at unit density; `None` without shapes: such a frame
-/// may remain massless if other links have shapes.
+/// Returns the inertia `M_L` of the shapes of a link at unit density, about Lo, in L; warns if a
+/// mesh is not closed. `None` without shapes: such a frame may remain massless if other links have
+/// shapes.
 fn of_shapes(link: &RawLink, shape: &LinkShape, report: &mut Report) -> Result<Option<SpatialInertia>, String> {
     let solids = shape.solids.as_ref().map_err(String::clone)?;
     if solids.is_empty() {
         return Ok(None);
     }
-    let M_L = of_solids(link, solids, report);
-    if M_L.mass > 0.0 { Ok(Some(M_L)) } else { Err("its mesh encloses no volume".to_owned()) }
-}
-
-/// Returns the inertia of the solids of a link at unit density; warns if a mesh is not closed.
-fn of_solids(link: &RawLink, solids: &[(Pose, MassProperties)], report: &mut Report) -> SpatialInertia {
     let open: usize = solids.iter().map(|(_, p)| p.open_edges).sum();
     if open > 0 {
         let message =
             format!("link {:?}: inertia is estimated from a mesh that is not closed ({open} open edges)", link.name);
         report.warning(&link.place, "open-mesh", message, "close the mesh or give <inertial>");
     }
-    solids.iter().fold(SpatialInertia::zeros(), |mut sum, (X_LV, p)| {
-        sum += unit_density(p).at_parent(X_LV);
-        sum
-    })
-}
-
-/// Links of the bodies without any `<inertial>`.
-fn links_without(robot: &RawRobot, bodies: &[Body]) -> impl Iterator<Item = usize> {
-    let empty = bodies.iter().filter(|b| b.members.iter().all(|&(i, _)| robot.links[i].inertial.is_none()));
-    empty.flat_map(|b| b.members.iter().map(|m| m.0))
+    let mut M_L = SpatialInertia::zeros();
+    for (X_LV, solid) in solids {
+        M_L += SpatialInertia::from_com(solid.volume, &solid.centroid, &solid.inertia).at_parent(X_LV);
+    }
+    if M_L.mass > 0.0 { Ok(Some(M_L)) } else { Err("its mesh encloses no volume".to_owned()) }
 }
 
 /// Ratio of diameter to length of a rod.
 const ROD: f64 = 0.2;
 
-/// Approximates a link by a rod of 1 kg/m from its frame to its farthest joint; `None` for a link
-/// without length.
+/// Approximates a link by a rod of 1 kg/m from its frame to its farthest joint: `M_L` about Lo, in
+/// L. `None` for a link without length.
+///
+/// ```text
+/// l³/12 (1 + 3/4 r²) across, l³ r²/8 about its axis, with the ratio r of diameter to length
+/// ```
 fn rod(robot: &RawRobot, link: usize) -> Option<SpatialInertia> {
     let ends =
         robot.joints.iter().filter(|j| j.urdf.parent.link == robot.links[link].name).map(|j| j.X_PJ.translation.vector);
@@ -420,8 +422,4 @@ fn rod(robot: &RawRobot, link: usize) -> Option<SpatialInertia> {
     let axis = along * along.transpose();
     let inertia = (Matrix3::identity() - axis) * across + axis * about;
     Some(SpatialInertia::from_com(length, &(end * 0.5), &inertia))
-}
-
-fn unit_density(p: &MassProperties) -> SpatialInertia {
-    SpatialInertia::from_com(p.volume, &p.centroid, &p.inertia)
 }

@@ -1,18 +1,22 @@
 //! Conversion of joints as written to joints of the mechanism: unit axes, limits, mimic joints.
+//!
+//! Start at [`convert_joints`]. Frames: P parent link, J joint, with `X_PJ` at zero position; axes
+//! are in J. Values in rad or m. Not here: missing or unreadable attributes ([`crate::lint`]), the
+//! tree ([`crate::tree`]).
 
 use std::collections::HashMap;
 
 use flexarm_kinematics::{Joint, JointKind, Limits, Mimic, Pose};
+use flexarm_settings::{Place, closest};
 use nalgebra::{Rotation3, Translation3, Unit, Vector3};
 use urdf_rs::JointType;
 
 use crate::lint::RATES;
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::{Report, did_you_mean, quoted};
-use flexarm_settings::Place;
-use flexarm_settings::closest;
 
-/// Tolerance of the axis length; axes written with four digits of 1/√2 pass without a warning.
+/// Tolerance of the length of an axis; axes written with four digits of 1/√2 pass without a
+/// warning.
 const UNIT_TOLERANCE: f64 = 1e-4;
 
 /// Removes `<mimic>` from fixed joints, and fixes joints that follow a fixed one, since their value
@@ -31,6 +35,7 @@ pub(crate) fn fix_still_followers(robot: &mut RawRobot, report: &mut Report) {
         let follows = |j: &&mut RawJoint| j.urdf.mimic.as_ref().is_some_and(|m| still.contains_key(&m.joint));
         let Some(joint) = robot.joints.iter_mut().find(follows) else { return };
         let Some(mimic) = joint.urdf.mimic.take().map(follower) else { return };
+        // The constant value moves J along or about the axis.
         let value = mimic.ratio * still.get(&mimic.joint).copied().unwrap_or(0.0) + mimic.offset;
         if let Some(axis) = Unit::try_new(Vector3::from(*joint.urdf.axis.xyz), 1e-12) {
             joint.X_PJ *= match joint.urdf.joint_type {
@@ -121,6 +126,7 @@ fn axis(raw: &RawJoint, report: &mut Report) -> Unit<Vector3<f64>> {
 fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
     let (name, limit) = (&raw.urdf.name, &raw.urdf.limit);
     let mut limits = Limits::NONE;
+    // Range of positions; a continuous joint has none.
     if raw.urdf.joint_type != JointType::Continuous {
         limits.lower = limit.lower;
         limits.upper = limit.upper;
@@ -133,6 +139,7 @@ fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
             report.warning(place, "no-range", message, "give lower and upper, or make the joint fixed");
         }
     }
+    // Bounds of rates and effort: zero means unknown, which does not limit.
     let mut magnitude = |attribute: &'static str, code: &'static str, value: f64| {
         if value < 0.0 {
             let message = format!("joint {name:?}: the {attribute} limit {value} is negative");
@@ -148,6 +155,7 @@ fn limits(raw: &RawJoint, place: &Place, report: &mut Report) -> Limits {
     limits.velocity = magnitude("velocity", "unknown-velocity", limit.velocity);
     let codes = ["unknown-acceleration", "unknown-deceleration", "unknown-jerk"];
     let [acceleration, deceleration, jerk] = [0, 1, 2].map(|k| magnitude(RATES[k], codes[k], raw.rates[k]));
+    // The motion has one bound for both directions.
     limits.acceleration = acceleration.min(deceleration);
     limits.jerk = jerk;
     if acceleration != deceleration {

@@ -67,7 +67,7 @@ mod xml;
 pub use error::UrdfError;
 pub use flexarm_settings::closest;
 pub use geometry::{Geometry, Visual};
-pub use mesh::{CrossSection, MassProperties, TriangleMesh, UpAxis, cross_section, load_mesh, load_mesh_with};
+pub use mesh::{CrossSection, MassProperties, TriangleMesh, UpAxis, cross_section, load_mesh};
 pub use read::{
     InertiaEstimate, JointDynamics, ReadOptions, UrdfRobot, check_urdf, check_urdf_text, expand_xacro, parse_urdf,
     read_urdf,

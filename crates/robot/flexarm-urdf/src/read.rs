@@ -1,7 +1,13 @@
 //! Reads a robot from a file: text, elements, tree, joints, shapes, masses.
+//!
+//! Start at [`read_urdf`]; [`assemble`] runs the checks in their order. Every check reports all its
+//! faults and goes on, so that one run lists them all.
+//! Not here: the checks themselves ([`crate::lint`], [`crate::tree`], [`crate::joints`],
+//! [`crate::shapes`], [`crate::inertia`]).
 
 use std::path::{Path, PathBuf};
 
+use flexarm_files::read_file;
 use flexarm_kinematics::{Link, Mechanism};
 use flexarm_settings::Finding;
 
@@ -133,7 +139,8 @@ pub fn expand_xacro(path: impl AsRef<Path>, options: &ReadOptions) -> Result<Str
     Ok(expanded.text)
 }
 
-/// Returns all findings about a file: errors, warnings and notes, in the order of the file.
+/// Returns all findings about a file: errors, warnings and notes, in the order of the file; a file
+/// that cannot be read gives one error.
 pub fn check_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
     let path = path.as_ref();
     match load_text(path) {
@@ -142,7 +149,7 @@ pub fn check_urdf(path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding>
     }
 }
 
-/// [`check_urdf`] for text.
+/// [`check_urdf`] for text; `origin_path` as in [`parse_urdf`].
 pub fn check_urdf_text(text: &str, origin_path: impl AsRef<Path>, options: &ReadOptions) -> Vec<Finding> {
     all_findings(parse(text, origin_path.as_ref(), options))
 }
@@ -156,7 +163,7 @@ fn all_findings((result, report): (Result<UrdfRobot, UrdfError>, Report)) -> Vec
 }
 
 /// Maximum size of a description (bytes); real robots have up to one megabyte.
-const LARGEST: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 
 fn resolver<'a>(path: &Path, options: &'a ReadOptions) -> Resolver<'a> {
     let folder = path.parent().map(Path::to_owned).unwrap_or_default();
@@ -165,24 +172,15 @@ fn resolver<'a>(path: &Path, options: &'a ReadOptions) -> Resolver<'a> {
 
 fn load_text(path: &Path) -> Result<String, UrdfError> {
     let io_error = |source| UrdfError::Io { path: path.to_owned(), source };
-    let meta = std::fs::metadata(path).map_err(io_error)?;
-    if meta.is_dir() {
+    if path.is_dir() {
         return Err(io_error(std::io::Error::other("this is a folder; name the URDF file in it")));
     }
-    // Devices and pipes are refused, since a read may never end.
-    if !meta.is_file() {
-        return Err(io_error(std::io::Error::other("this is not a file; give the path of a regular one")));
-    }
-    if meta.len() > LARGEST {
-        let what = format!("{} bytes, more than the {LARGEST} that are read", meta.len());
-        return Err(io_error(std::io::Error::new(std::io::ErrorKind::FileTooLarge, what)));
-    }
-    let bytes = std::fs::read(path).map_err(io_error)?;
-    Ok(xml::decode(bytes, path)?)
+    Ok(xml::decode(read_file(path, MAX_BYTES).map_err(io_error)?, path)?)
 }
 
 fn parse(text: &str, path: &Path, options: &ReadOptions) -> (Result<UrdfRobot, UrdfError>, Report) {
     let mut report = Report::default();
+    // Undeclared prefixes would stop the XML parser.
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let (declared, prefixes) = xml::declared(text, &xml::Lines::new(path, text));
     for (prefix, place) in prefixes {
@@ -192,6 +190,7 @@ fn parse(text: &str, path: &Path, options: &ReadOptions) -> (Result<UrdfRobot, U
     }
     let text = &*declared;
     let resolver = resolver(path, options);
+    // Plain URDF.
     if !(xacro::is_xacro(path) || xacro::has_xacro(text)) {
         if let Some((name, _)) = options.arguments.first() {
             let message = format!("the argument {name:?} has no effect: the file is not a xacro file");
@@ -200,6 +199,7 @@ fn parse(text: &str, path: &Path, options: &ReadOptions) -> (Result<UrdfRobot, U
         let result = parse_expanded(text, xml::Lines::new(path, text), &[], &resolver, options, &mut report);
         return (result, report);
     }
+    // Xacro: places of later findings are those in the files that were expanded.
     let expanded = match xacro::expand(text, path, &resolver, &options.arguments) {
         Ok(expanded) => expanded,
         Err(error) => return (Err(error), report),
@@ -254,7 +254,7 @@ fn assemble(
     let mut mechanism = Mechanism::new(&raw.name);
     mechanism.joints = joints::convert_joints(raw, report);
 
-    let visuals = shapes::find_visuals(raw, resolver, options.up_axis, report);
+    let visuals = shapes::find_shapes(raw, |link| &link.visuals, resolver, options.up_axis, report);
     let shapes = if options.inspect_meshes || options.inertia_from_mesh.is_some() {
         shapes::inspect(raw, &visuals, report)
     } else {
@@ -267,12 +267,14 @@ fn assemble(
     mechanism.links =
         raw.links.iter().zip(inertias).map(|(link, inertia)| Link { name: link.name.clone(), inertia }).collect();
 
+    let mut unused = Report::default();
+    let collisions = shapes::find_shapes(raw, |link| &link.collisions, resolver, options.up_axis, &mut unused);
     let tcp_candidates = tcp_candidates(&mechanism).into_iter().map(str::to_owned).collect();
     let moving = raw.joints.iter().filter(|j| !j.is_fixed());
     UrdfRobot {
         text: text.to_owned(),
         mesh_files: resolver.mesh_files(text),
-        collisions: shapes::find_collisions(raw, resolver, options.up_axis),
+        collisions,
         visuals,
         tcp_candidates,
         warnings: Vec::new(),

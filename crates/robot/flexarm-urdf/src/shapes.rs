@@ -1,18 +1,21 @@
-//! Visuals of a robot: finds their files and, on request, inspects them.
+//! Visual and collision shapes of a robot: finds their files and, on request, inspects them.
+//!
+//! Start at [`find_shapes`] and [`inspect`]. Frames: L link, V the shape's own frame; lengths in m.
+//! Not here: reading meshes ([`crate::mesh`]), conclusions for masses ([`crate::inertia`]).
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use flexarm_kinematics::Pose;
+use flexarm_settings::Place;
 use nalgebra::{Point3, Vector3};
 use urdf_rs::Geometry as Shape;
 
 use crate::geometry::{Geometry, Visual};
 use crate::mesh::{MassProperties, TriangleMesh, UpAxis, load_with_remarks};
-use crate::raw::{RawRobot, RawVisual, color};
+use crate::raw::{RawLink, RawRobot, RawVisual, color};
 use crate::report::Report;
 use crate::resolve::Resolver;
-use flexarm_settings::Place;
 
 /// Size above which geometry was probably drawn in millimetres (m).
 const LARGE: f64 = 30.0;
@@ -21,25 +24,29 @@ const SMALL: f64 = 1e-4;
 
 /// Shape data of a link for the inertia checks.
 pub(crate) struct LinkShape {
-    /// Bounding box of all shapes in link axes; `None` if there are none or one is unknown.
-    pub(crate) bounds: Option<(Vector3<f64>, Vector3<f64>)>,
+    /// Bounding box of all shapes in L; `None` if there are none or one is unknown.
+    pub(crate) bounds: Option<Bounds>,
     /// Poses `X_LV` and mass properties of all shapes, or the reason why one is unknown.
     pub(crate) solids: Result<Vec<(Pose, MassProperties)>, String>,
 }
 
-/// Returns all visuals, with their mesh files.
-pub(crate) fn find_visuals(
+/// Lowest and highest corner of a box (m).
+type Bounds = (Vector3<f64>, Vector3<f64>);
+
+/// Returns the visual or collision shapes of all links, with their mesh files if found.
+pub(crate) fn find_shapes(
     robot: &RawRobot,
+    of_link: fn(&RawLink) -> &[RawVisual],
     resolver: &Resolver<'_>,
     up_axis: UpAxis,
     report: &mut Report,
 ) -> Vec<Visual> {
-    let mut visuals = Vec::new();
+    let mut found = Vec::new();
     for link in &robot.links {
-        for raw in &link.visuals {
+        for raw in of_link(link) {
             let material = raw.urdf.material.as_ref();
             let named = || robot.materials.get(&material?.name).copied();
-            visuals.push(Visual {
+            found.push(Visual {
                 link: link.name.clone(),
                 X_LV: raw.X_LV,
                 geometry: geometry(raw, &link.name, resolver, up_axis, report),
@@ -48,21 +55,7 @@ pub(crate) fn find_visuals(
             });
         }
     }
-    visuals
-}
-
-/// Returns all collision shapes, with their mesh files if found.
-pub(crate) fn find_collisions(robot: &RawRobot, resolver: &Resolver<'_>, up_axis: UpAxis) -> Vec<Visual> {
-    let mut unheard = Report::default();
-    let of_link = robot.links.iter().flat_map(|link| link.collisions.iter().map(move |raw| (link, raw)));
-    let shape = |(link, raw): (&crate::raw::RawLink, &RawVisual)| Visual {
-        link: link.name.clone(),
-        X_LV: raw.X_LV,
-        geometry: geometry(raw, &link.name, resolver, up_axis, &mut unheard),
-        color: None,
-        name: raw.urdf.name.clone(),
-    };
-    of_link.map(shape).collect()
+    found
 }
 
 fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, up_axis: UpAxis, report: &mut Report) -> Geometry {
@@ -83,7 +76,7 @@ fn geometry(raw: &RawVisual, link: &str, resolver: &Resolver<'_>, up_axis: UpAxi
     }
 }
 
-/// Bounds and mass properties of every link's shapes; `visuals` are those of [`find_visuals`].
+/// Bounds and mass properties of every link's visuals, which are those of [`find_shapes`].
 pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report) -> Vec<LinkShape> {
     let mut meshes = Meshes::default();
     let mut visuals = visuals.iter();
@@ -91,14 +84,12 @@ pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report)
         .links
         .iter()
         .map(|link| {
-            let mut bounds: Option<(Vector3<f64>, Vector3<f64>)> = None;
+            let mut bounds: Option<Bounds> = None;
             let mut solids = Ok(Vec::new());
             for (raw, visual) in link.visuals.iter().zip(visuals.by_ref()) {
                 match meshes.inspect(visual, &raw.place, report) {
-                    Ok((box_of_visual, solid)) => {
-                        bounds = Some(bounds.map_or(box_of_visual, |(low, high)| {
-                            (low.inf(&box_of_visual.0), high.sup(&box_of_visual.1))
-                        }));
+                    Ok(((low, high), solid)) => {
+                        bounds = Some(bounds.map_or((low, high), |b| (b.0.inf(&low), b.1.sup(&high))));
                         if let Ok(solids) = &mut solids {
                             solids.push((visual.X_LV, solid));
                         }
@@ -118,7 +109,7 @@ pub(crate) fn unknown(robot: &RawRobot) -> Vec<LinkShape> {
     robot.links.iter().map(|_| unknown()).collect()
 }
 
-fn check_size(link: &str, place: &Place, bounds: Option<(Vector3<f64>, Vector3<f64>)>, report: &mut Report) {
+fn check_size(link: &str, place: &Place, bounds: Option<Bounds>, report: &mut Report) {
     let Some((low, high)) = bounds else { return };
     let size = (high - low).norm();
     if size > LARGE {
@@ -130,8 +121,6 @@ fn check_size(link: &str, place: &Place, bounds: Option<(Vector3<f64>, Vector3<f
     }
 }
 
-type Bounds = (Vector3<f64>, Vector3<f64>);
-
 /// Mesh files, each read once.
 #[derive(Default)]
 struct Meshes {
@@ -139,7 +128,7 @@ struct Meshes {
 }
 
 impl Meshes {
-    /// Box in link axes and mass properties in V of one visual.
+    /// Box in L and mass properties in V of one visual.
     fn inspect(
         &mut self,
         visual: &Visual,

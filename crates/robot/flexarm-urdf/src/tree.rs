@@ -7,11 +7,10 @@
 use std::collections::{HashMap, HashSet};
 
 use flexarm_kinematics::Pose;
+use flexarm_settings::{Place, closest};
 
 use crate::raw::{RawJoint, RawRobot};
 use crate::report::{Report, did_you_mean, quoted};
-use flexarm_settings::Place;
-use flexarm_settings::closest;
 
 /// Reports duplicate names of links and joints; later checks use only the first.
 pub(crate) fn check_names(robot: &RawRobot, report: &mut Report) {
@@ -122,8 +121,9 @@ pub(crate) struct Body {
     pub(crate) moved_by: Option<usize>,
 }
 
-/// Returns all bodies of a sound tree, the base first.
+/// Returns all bodies of a sound tree, the base first. The order is depth first.
 pub(crate) fn moving_bodies(robot: &RawRobot) -> Vec<Body> {
+    // Joints below each link.
     let index: HashMap<&str, usize> = robot.links.iter().enumerate().map(|(i, l)| (l.name.as_str(), i)).collect();
     let mut children: Vec<Vec<usize>> = vec![Vec::new(); robot.links.len()];
     let mut has_parent = vec![false; robot.links.len()];
@@ -135,6 +135,8 @@ pub(crate) fn moving_bodies(robot: &RawRobot) -> Vec<Body> {
             has_parent[c] = true;
         }
     }
+    // A body starts at the base or at a link with a moving joint. It grows by the fixed joints
+    // below it; each moving one starts another body.
     let mut pending: Vec<(usize, Option<usize>)> =
         has_parent.iter().enumerate().filter(|(_, has)| !**has).map(|(i, _)| (i, None)).collect();
     let mut bodies = Vec::new();

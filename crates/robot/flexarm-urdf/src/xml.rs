@@ -1,6 +1,8 @@
 //! Well-formedness and positions: describes the first syntax error of a broken file, and its place.
 //!
-//! Not here: the meaning of elements ([`crate::document`]).
+//! Start at [`parse`] and [`Lines`]. Lines and columns count from 1, columns in characters.
+//! Not here: the meaning of elements ([`crate::lint`]), a tree that can be changed
+//! (`crate::xacro::document`).
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -96,6 +98,7 @@ pub(crate) fn parse<'t>(text: &'t str, lines: &Lines<'_>) -> Result<Document<'t>
 /// itself with their places. Other readers of URDF ignore name spaces.
 pub(crate) fn declared<'t>(text: &'t str, lines: &Lines<'_>) -> (Cow<'t, str>, Vec<(String, Place)>) {
     let mut missing: Vec<(String, Place)> = Vec::new();
+    // Offset after the name of the root element, where declarations are inserted.
     let mut root = None;
     for (at, tag, _) in tags(text).filter(|(_, tag, _)| !tag[1..].starts_with(['!', '?', '/'])) {
         let name = tag.trim_start_matches('<').trim_start();

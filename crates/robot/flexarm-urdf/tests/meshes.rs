@@ -304,9 +304,9 @@ fn broken_files_are_refused_with_the_reason() {
     assert!(reason(looped.as_bytes(), "a.dae").contains("cycle"));
     let glb = glb();
     assert!(reason(&glb[..glb.len() - 8], "a.glb").contains("cut off"));
-    let missing = load_mesh("/nowhere/a.stl").unwrap_err();
+    let missing = load_mesh("/nowhere/a.stl", UpAxis::Declared).unwrap_err();
     assert!(missing.to_string().starts_with("/nowhere/a.stl: cannot be read"), "{missing}");
-    let folder = load_mesh(std::env::temp_dir()).unwrap_err();
+    let folder = load_mesh(std::env::temp_dir(), UpAxis::Declared).unwrap_err();
     assert!(folder.message.contains("not a file"), "{folder}");
 }
 

@@ -3,14 +3,16 @@
 //! Abaqus `*MATRIX OUTPUT` and newer CalculiX write the first format, Abaqus `COORDINATE` and
 //! CalculiX `.sti`/`.mas` the second. The file may contain either triangle or both.
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 
 use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
-use super::text::{Text, shown, words};
+use super::position::ErrorPosition;
+use super::text::{Text, words};
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Lines with data, without comments and empty lines.
-fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::position::ErrorPosition<'a>, &'a str)> + use<'a> {
+fn data<'a>(text: &Text<'a>) -> impl Iterator<Item = (ErrorPosition<'a>, &'a str)> + use<'a> {
     text.lines().filter(|(_, line)| !line.starts_with("**") && !line.trim().is_empty())
 }
 
@@ -22,13 +24,13 @@ pub fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>)
     for (place, line) in data(&text) {
         let mut values = words(line);
         let mut label = |what| -> Result<DofLabel, FeFileError> {
-            let node = place.integer(what, place.word(what, &mut values)?)?;
+            let node = place.next_integer(what, &mut values)?;
             let dof = place.word("degree of freedom", &mut values)?;
             let range = || place.fail("degree of freedom", shown(dof), "0 to 255", "");
-            Ok(DofLabel::new(node, dof.parse().map_err(|_| range())?))
+            Ok(DofLabel::new(node, dof.parse().ok().ok_or_else(range)?))
         };
         let (row, column) = (label("node of the row")?, label("node of the column")?);
-        let value = place.number("entry", place.word("entry", &mut values)?)?;
+        let value = place.next_number("entry", &mut values)?;
         place.end(&mut values)?;
         entries.push((row, column, value, place));
     }
@@ -44,15 +46,10 @@ pub fn parse_labelled(text: Text<'_>) -> Result<(LabelledMatrix, Option<String>)
         )
     });
     let rows: Vec<_> = mesh.into_iter().chain(internal.into_iter().rev()).collect();
-    let index: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
-    let mut triplets = Triplets::default();
-    for (row, column, value, place) in entries {
-        triplets.push(index[&row], index[&column], value, &place);
-    }
     if rows.is_empty() {
         return Err(text.file().fail("matrix", "no entries", "at least one", ""));
     }
-    Ok((triplets.symmetric("the matrix", text.origin, rows, Storage::BySize)?, warning))
+    Ok((Triplets::labelled("the matrix", text.origin, rows, &entries)?, warning))
 }
 
 /// Reads `row column value`, rows from 1; they have no labels.
@@ -60,14 +57,14 @@ pub(super) fn parse_coordinate(text: Text<'_>, storage: Storage) -> Result<Label
     let mut triplets = Triplets::default();
     for (place, line) in data(&text) {
         let mut values = words(line);
-        let row = place.index("row", place.word("row", &mut values)?)?;
-        let column = place.index("column", place.word("column", &mut values)?)?;
-        let value = place.number("entry", place.word("entry", &mut values)?)?;
+        let row = place.next_index("row", &mut values)?;
+        let column = place.next_index("column", &mut values)?;
+        let value = place.next_number("entry", &mut values)?;
         place.end(&mut values)?;
         triplets.push(row, column, value, &place);
     }
-    let rows = triplets.unlabelled(triplets.extent(), &text.file())?;
-    triplets.symmetric("the matrix", text.origin, rows, storage)
+    let n = triplets.extent();
+    triplets.unlabelled("the matrix", n, &text.file(), storage)
 }
 
 /// Reads a CalculiX `.dof`: one `node.dof` per row, as text, because `10.1` and `10.10` differ.
@@ -90,12 +87,12 @@ pub(super) fn parse_equation_mapping(text: Text<'_>) -> Result<Vec<DofLabel>, Fe
     let mut rows = Vec::new();
     for (place, line) in data(&text).skip(1) {
         let mut values = words(line);
-        let equation = place.index("equation", place.word("equation", &mut values)?)?;
+        let equation = place.next_index("equation", &mut values)?;
         if equation != rows.len() {
             let (found, expected) = (format!("{}", equation + 1), format!("{}", rows.len() + 1));
             return Err(place.fail("equation", found, expected, "equations in order"));
         }
-        let node = place.integer("node", place.word("node", &mut values)?)?;
+        let node = place.next_integer("node", &mut values)?;
         let name = place.word("DOF", &mut values)?;
         let dof = COMPONENTS.iter().position(|known| name.eq_ignore_ascii_case(known));
         let wrong = || {

@@ -42,13 +42,14 @@ pub struct InterfaceMatrices {
 /// * `units`: units of the file; `None` uses those of the sidecar.
 ///
 /// # Errors
-/// Without a map (with a proposal) or units, for a map that does not fit or leaves rows that are not
-/// modes, and as [`diagnose_substructure`].
+/// Without a map (with a proposal) or units, for a map that does not fit or leaves rows that are
+/// not modes, and as [`diagnose_substructure`].
 pub fn assemble_interfaces(
     imported: &ImportedMatrices,
     map: Option<&InterfaceMap>,
     units: Option<&UnitSystem>,
 ) -> Result<InterfaceMatrices, FeFileError> {
+    // Map and units: those given, otherwise those of the sidecar.
     let place = ErrorPosition::file(&imported.origin);
     let sidecar = imported.sidecar.as_ref();
     let map = map.cloned().or_else(|| Some(sidecar?.map())).filter(|map| !map.interfaces.is_empty());
@@ -61,6 +62,7 @@ pub fn assemble_interfaces(
     let rows: Vec<usize> = resolved.interfaces.iter().flatten().chain(&resolved.modal).copied().collect();
     let boundary = 6 * resolved.interfaces.len();
 
+    // Displacement units d_i of the rows, and the equation of the module.
     let d: Vec<f64> = (0..rows.len())
         .map(|i| match i {
             i if i >= boundary => units.mass.sqrt() * units.length,
@@ -80,6 +82,7 @@ pub fn assemble_interfaces(
     };
     let K = pick(&imported.stiffness, energy)?;
     let M = imported.mass.as_ref().map(|mass| pick(mass, inertia)).transpose()?;
+    // Rows that are not modes, or interfaces that are not coupled, mean another matrix.
     if map.modal.is_empty() {
         check_modes(imported, &K, &rows, boundary)?;
     }

@@ -1,8 +1,9 @@
 //! Nastran bulk data: joins physical lines in small, large or free field into entries.
 
 use super::position::ErrorPosition;
-use super::text::{Text, shown};
+use super::text::Text;
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Entry with all its continuation lines.
 #[derive(Debug)]

@@ -10,10 +10,11 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use nalgebra::Vector3;
 
 use super::cards::{Card, cards};
-use super::matrix::{DofLabel, LabelledMatrix, Storage, Triplets};
+use super::matrix::{DofLabel, LabelledEntry, LabelledMatrix, Triplets};
 use super::position::ErrorPosition;
-use super::text::{Text, shown};
+use super::text::Text;
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Contents of a file with DMIG entries.
 #[derive(Debug, Default)]
@@ -28,7 +29,7 @@ struct RawMatrix<'a> {
     /// IFO 2 or 9: rows and columns have different meanings even if their numbers are the same.
     is_rectangular: bool,
     header: ErrorPosition<'a>,
-    entries: Vec<(DofLabel, DofLabel, f64, ErrorPosition<'a>)>,
+    entries: Vec<LabelledEntry<'a>>,
 }
 
 /// Reads all matrices that can be a stiffness or a mass; others are named in the warnings.
@@ -87,13 +88,12 @@ fn check_header(card: &Card<'_>, name: &str) -> Result<(), FeFileError> {
 /// Reads a column `DMIG NAME GJ CJ _ (Gi Ci Ai Bi)...`.
 fn parse_column<'a>(card: &Card<'a>, matrix: &mut RawMatrix<'a>) -> Result<(), FeFileError> {
     let column = label(&card.place, "column", card.field(1), card.field(2))?;
-    let place_of = |i: usize| card.place_of(i);
     for first in (4..card.fields.len()).step_by(4) {
         let [node, dof, value, imaginary] = std::array::from_fn(|i| card.field(first + i));
         if node.is_empty() && dof.is_empty() && value.is_empty() {
             continue;
         }
-        let place = place_of(first);
+        let place = card.place_of(first);
         let row = label(&place, "row", node, dof)?;
         let element = format!("DMIG {}, row {row}, column {column}", matrix.name);
         if !imaginary.is_empty() && place.number(&element, imaginary)? != 0.0 {
@@ -164,10 +164,5 @@ fn assemble(
     // Grids first, then scalar points (modal coordinates), each in ascending order.
     let mut labels: Vec<DofLabel> = rows.union(&columns).copied().collect();
     labels.sort_by_key(|label| (label.dof == 0, *label));
-    let index: HashMap<DofLabel, usize> = labels.iter().enumerate().map(|(i, label)| (*label, i)).collect();
-    let mut triplets = Triplets::default();
-    for (row, column, value, place) in &entries {
-        triplets.push(index[row], index[column], *value, place);
-    }
-    triplets.symmetric(&name, text.origin, labels, Storage::BySize).map(Some)
+    Triplets::labelled(&name, text.origin, labels, &entries).map(Some)
 }

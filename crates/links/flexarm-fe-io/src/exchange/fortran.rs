@@ -1,9 +1,9 @@
-//! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, fields of such formats, and numbers
-//! as Fortran writes them.
+//! Fortran edit descriptors: `(8I10)`, `(1P,3E25.16)`, `1P5D16.9`, fields of such formats, and
+//! numbers as Fortran writes them.
 
 use super::position::ErrorPosition;
-use super::text::shown;
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Repeated fields of equal width.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,18 +3,16 @@
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::position::ErrorPosition;
-use super::text::{Text, shown, words};
+use super::text::{Text, words};
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Reads a matrix; a `.mapping` file gives the labels of its rows.
 pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
+    // Header: title, numbers of lines, kind and sizes, formats of the lists.
     let mut lines = text.lines();
-    let mut next = || {
-        lines.next().ok_or_else(|| {
-            let expected = "a header of four lines";
-            text.file().fail("header", "the end of the file", expected, "")
-        })
-    };
+    let cut_off = || text.file().fail("header", "the end of the file", "a header of four lines", "");
+    let mut next = || lines.next().ok_or_else(cut_off);
     let (_title, (place, counts)) = (next()?, next()?);
     let right_hand_sides = words(counts).nth(4).map_or(Ok(0), |count| place.integer("right-hand sides", count))?;
     let (place, kind) = next()?;
@@ -29,10 +27,12 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
         next()?;
     }
 
+    // Lists: first entry of each column, row of each entry, value of each entry.
     let pointers = list(text, &mut lines, "column pointers", pointers, n.saturating_add(1))?;
     let indices = list(text, &mut lines, "row numbers", indices, promised)?;
     let values = list(text, &mut lines, "values", values, promised)?;
 
+    // Entries by columns; the pointer after a column ends it.
     let mut triplets = Triplets::default();
     let mut start = 0;
     for (column, (place, pointer)) in pointers.iter().enumerate() {
@@ -51,8 +51,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
         }
         start = end;
     }
-    let rows = triplets.unlabelled(n, &text.file())?;
-    triplets.symmetric("the matrix", text.origin, rows, Storage::BySize)
+    triplets.unlabelled("the matrix", n, &text.file(), Storage::BySize)
 }
 
 /// Reads the fields of a list, which starts on a new line.
@@ -66,9 +65,8 @@ fn list<'a>(
     let mut fields = Vec::new();
     while fields.len() < count {
         let Some((place, line)) = lines.next() else {
-            let (found, expected) = (format!("{} {what}", fields.len()), format!("{count}"));
-            let help = "is the file cut off?";
-            return Err(text.file().fail("matrix", found, expected, help));
+            let found = format!("{} {what}", fields.len());
+            return Err(text.file().fail("matrix", found, count.to_string(), "is the file cut off?"));
         };
         fields.extend(format.fields(line).map(|field| (place, field)));
     }
@@ -84,12 +82,5 @@ fn parse_kind(place: &ErrorPosition<'_>, line: &str) -> Result<(usize, usize), F
         let expected = "RSA or RUA: real, symmetric or unsymmetric, assembled";
         return Err(place.fail("type", shown(kind), expected, ""));
     }
-    let rows = place.index("number of rows", place.word("number of rows", &mut words)?)? + 1;
-    let columns = place.index("number of columns", place.word("number of columns", &mut words)?)? + 1;
-    let entries = place.index("number of entries", place.word("number of entries", &mut words)?)? + 1;
-    if rows != columns {
-        let found = format!("{rows} rows and {columns} columns");
-        return Err(place.fail("size", found, "a square matrix", ""));
-    }
-    Ok((rows, entries))
+    Ok((place.square_size(&mut words)?, place.next_index("number of entries", &mut words)? + 1))
 }

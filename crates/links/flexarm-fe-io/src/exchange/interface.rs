@@ -6,13 +6,14 @@
 //! A=#1-6,B=#7-12                                 rows of the file, from 1
 //! A=1001,B=1002,modal=#13-22                     other rows that are modal coordinates
 //! ```
-//! Every interface needs six rows, in the order ux uy uz rx ry rz.
+//! Every interface needs six rows, in the order ux uy uz rx ry rz. Start at [`InterfaceMap`], and
+//! at [`propose_map`] for a file without one. Not here: values and units ([`super::assemble`]).
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
 use std::str::FromStr;
 
-use super::matrix::{DofLabel, LabelledMatrix};
+use super::matrix::{DofLabel, LARGEST_DENSE, LabelledMatrix, index_of};
 use super::position::ErrorPosition;
 use crate::FeFileError;
 
@@ -147,7 +148,7 @@ impl FromStr for InterfaceMap {
 }
 
 /// Rows of a map in a matrix, from 0.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 #[doc(hidden)]
 pub struct ResolvedMap {
     pub interfaces: Vec<[usize; 6]>,
@@ -158,7 +159,7 @@ impl InterfaceMap {
     /// Finds the rows; all remaining rows must be modal coordinates.
     #[doc(hidden)]
     pub fn resolve(&self, rows: &[DofLabel], origin: &str) -> Result<ResolvedMap, FeFileError> {
-        let index: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
+        let index = index_of(rows);
         let mut owner: HashMap<usize, &str> = HashMap::new();
         let mut find = |name, picks: &[RowPick]| -> Result<Vec<usize>, FeFileError> {
             let mut found = Vec::new();
@@ -173,6 +174,7 @@ impl InterfaceMap {
             }
             Ok(found)
         };
+        // Six rows of each interface.
         let mut interfaces = Vec::new();
         for interface in &self.interfaces {
             let found = find(interface.name.as_str(), &interface.picks)?;
@@ -182,6 +184,7 @@ impl InterfaceMap {
             })?;
             interfaces.push(six);
         }
+        // Modal coordinates: those of the map, otherwise all remaining rows, if they are scalar.
         let mut modal = find("modal", &self.modal)?;
         for (row, label) in rows.iter().enumerate().filter(|(row, _)| !owner.contains_key(row)) {
             let is_scalar = label.dof == 0 || label.node.is_none_or(|node| node < 0);
@@ -239,7 +242,7 @@ fn nodes_in(index: &HashMap<DofLabel, usize>) -> String {
 pub fn propose_map_of(matrix: &LabelledMatrix) -> Option<InterfaceMap> {
     let n = matrix.size();
     let unlabelled = matrix.rows.iter().all(|label| *label == DofLabel::UNKNOWN);
-    if !unlabelled || n > super::matrix::LARGEST_DENSE {
+    if !unlabelled || n > LARGEST_DENSE {
         return propose_map(&matrix.rows);
     }
     let mut is_coupled = vec![false; n];
@@ -284,7 +287,7 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
         n @ 4..=MAX_PROPOSED if all(3) && n.is_multiple_of(2) => {
             named((0..n / 2).map(|k| vec![node(2 * k, 3), node(2 * k + 1, 3)]).collect())
         }
-        0 if rows.len() >= 12 && rows.len() <= super::matrix::LARGEST_DENSE => {
+        0 if rows.len() >= 12 && rows.len() <= LARGEST_DENSE => {
             let n = rows.len() / 6;
             let n = if rows.len().is_multiple_of(6) && n <= MAX_PROPOSED { n } else { 2 };
             named((0..n).map(|k| vec![RowPick::Rows { first: 6 * k + 1, last: 6 * k + 6 }]).collect())

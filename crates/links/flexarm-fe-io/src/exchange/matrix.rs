@@ -1,4 +1,8 @@
-//! Symmetric matrices with labelled rows as they are in a file; no unit conversion here.
+//! Symmetric matrices with labelled rows as they are in a file.
+//!
+//! Start at [`LabelledMatrix`]; readers collect [`Triplets`] and finish with one of its
+//! constructors. Units are those of the file. Not here: units and interfaces ([`super::assemble`]),
+//! parsing.
 
 use std::collections::HashMap;
 use std::fmt;
@@ -9,11 +13,11 @@ use super::position::ErrorPosition;
 use crate::FeFileError;
 
 /// Maximum number of rows of a matrix that is stored dense (32 MB).
-pub const LARGEST_DENSE: usize = 2000;
+pub(super) const LARGEST_DENSE: usize = 2000;
 
 /// Allowed difference of mirrored entries relative to `sqrt(|k_ii k_jj|)`: the last of nine printed
 /// decimals.
-pub const LARGEST_ASYMMETRY: f64 = 1e-8;
+pub(super) const LARGEST_ASYMMETRY: f64 = 1e-8;
 
 /// Role of a matrix.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -99,7 +103,7 @@ impl SparseSymmetric {
 /// Entries of a matrix.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Entries {
-    /// Dense, up to [`LARGEST_DENSE`] rows; both triangles, exactly symmetric.
+    /// Dense, up to 2000 rows; both triangles, exactly symmetric.
     Dense(DMatrix<f64>),
     /// Sparse, for full models.
     Sparse(SparseSymmetric),
@@ -157,6 +161,14 @@ impl LabelledMatrix {
     }
 }
 
+/// Labels of row and column, value, and place of an entry.
+pub(super) type LabelledEntry<'a> = (DofLabel, DofLabel, f64, ErrorPosition<'a>);
+
+/// Position of each label, from 0.
+pub(super) fn index_of(rows: &[DofLabel]) -> HashMap<DofLabel, usize> {
+    rows.iter().enumerate().map(|(i, label)| (*label, i)).collect()
+}
+
 /// Entries as read from a file, in any order and from either triangle.
 #[derive(Debug, Default)]
 pub(super) struct Triplets {
@@ -196,15 +208,36 @@ impl Triplets {
         self.entries.iter().map(|t| t.row.max(t.column) as usize + 1).max().unwrap_or(0)
     }
 
-    /// Labels for rows without information in the file; an error if there are too few entries for
-    /// `n` rows.
-    pub(super) fn unlabelled(&self, n: usize, place: &ErrorPosition<'_>) -> Result<Vec<DofLabel>, FeFileError> {
+    /// Builds a symmetric matrix whose rows have no information in the file; an error if there are
+    /// too few entries for `n` rows.
+    pub(super) fn unlabelled(
+        self,
+        name: &str,
+        n: usize,
+        place: &ErrorPosition<'_>,
+        storage: Storage,
+    ) -> Result<LabelledMatrix, FeFileError> {
         if n == 0 || (n > LARGEST_DENSE && n > 8 * self.len()) {
             let found = format!("{n} rows, but {} entries", self.len());
             let help = "a stiffness has an entry in every row; is this another file?";
             return Err(place.fail("matrix", found, "entries in every row", help));
         }
-        Ok(vec![DofLabel::UNKNOWN; n])
+        self.symmetric(name, place.origin, vec![DofLabel::UNKNOWN; n], storage)
+    }
+
+    /// Builds the symmetric matrix of `rows` from entries whose labels are all in it.
+    pub(super) fn labelled(
+        name: &str,
+        origin: &str,
+        rows: Vec<DofLabel>,
+        entries: &[LabelledEntry<'_>],
+    ) -> Result<LabelledMatrix, FeFileError> {
+        let index = index_of(&rows);
+        let mut triplets = Self::default();
+        for (row, column, value, place) in entries {
+            triplets.push(index[row], index[column], *value, place);
+        }
+        triplets.symmetric(name, origin, rows, Storage::BySize)
     }
 
     /// Builds the symmetric matrix: fills missing triangles and rejects contradictions.
@@ -217,6 +250,7 @@ impl Triplets {
         rows: Vec<DofLabel>,
         storage: Storage,
     ) -> Result<LabelledMatrix, FeFileError> {
+        // Square roots of the diagonal, the scale of the asymmetry.
         let n = rows.len();
         let mut scale = vec![0.0_f64; n];
         for t in self.entries.iter().filter(|t| t.row == t.column) {
@@ -280,17 +314,11 @@ fn common_value(
     let element = format!("entry ({}, {}) of {name}, rows {} and {}", row + 1, column + 1, rows[row], rows[column]);
     let line = Some(last.line as usize).filter(|line| *line > 0);
     let what = if mirrored.is_some() { "mirrored entries" } else { "the entry twice" };
-    Err(ErrorPosition { origin, line }.fail(
-        element,
-        format!(
-            "{what}: {:e} at {} and {:e}",
-            first.value,
-            ErrorPosition::line(origin, first.line as usize).place(),
-            last.value
-        ),
-        format!("equal values, mirrored ones to {LARGEST_ASYMMETRY:.0e} of sqrt(k_ii k_jj)"),
-        "stiffness and mass are symmetric; do not add up matrices of several parts in one file",
-    ))
+    let other = ErrorPosition::line(origin, first.line as usize).place();
+    let found = format!("{what}: {:e} at {other} and {:e}", first.value, last.value);
+    let expected = format!("equal values, mirrored ones to {LARGEST_ASYMMETRY:.0e} of sqrt(k_ii k_jj)");
+    let help = "stiffness and mass are symmetric; do not add up matrices of several parts in one file";
+    Err(ErrorPosition { origin, line }.fail(element, found, expected, help))
 }
 
 /// Reorders the rows of a matrix; rows that it lacks become zero.
@@ -300,7 +328,7 @@ pub(super) fn reordered(matrix: &LabelledMatrix, rows: &[DofLabel]) -> Option<La
     if matrix.rows == rows {
         return Some(matrix.clone());
     }
-    let places: HashMap<DofLabel, usize> = rows.iter().enumerate().map(|(i, label)| (*label, i)).collect();
+    let places = index_of(rows);
     let target: Option<Vec<usize>> = matrix.rows.iter().map(|label| places.get(label).copied()).collect();
     let target = target?;
     let mut moved = Triplets::default();

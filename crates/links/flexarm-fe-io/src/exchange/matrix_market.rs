@@ -9,8 +9,9 @@ use nalgebra::DMatrix;
 
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::position::ErrorPosition;
-use super::text::{Text, shown, words};
+use super::text::{Text, words};
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Symmetry: one triangle (the lower one by the standard), or all entries.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -29,19 +30,13 @@ pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
     let mut lines = lines.filter(|(_, line)| !line.starts_with('%') && !line.trim().is_empty());
     let (place, size) = lines.next().ok_or_else(|| cut_off(&text.file()))?;
     let mut size = words(size);
-    let rows = place.index("number of rows", place.word("number of rows", &mut size)?)? + 1;
-    let columns = place.index("number of columns", place.word("number of columns", &mut size)?)? + 1;
-    if rows != columns {
-        let found = format!("{rows} rows and {columns} columns");
-        return Err(place.fail("size", found, "a square matrix", ""));
-    }
+    let rows = place.square_size(&mut size)?;
     let header = place;
     let mut triplets = Triplets::default();
     let promised = if is_array {
         size_of_array(rows, symmetry)
     } else {
-        let promised = place.word("number of entries", &mut size)?;
-        usize::try_from(place.integer("number of entries", promised)?).unwrap_or(usize::MAX)
+        usize::try_from(place.next_integer("number of entries", &mut size)?).unwrap_or(usize::MAX)
     };
     place.end(&mut size)?;
 
@@ -53,22 +48,21 @@ pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
             return Err(place.fail("matrix", found, format!("{promised}"), ""));
         }
         if is_array {
-            let value = place.number("entry", place.word("entry", &mut values)?)?;
-            triplets.push(row, column, value, &place);
+            // An array has the values by columns, of a symmetric matrix from the diagonal down.
+            triplets.push(row, column, place.next_number("entry", &mut values)?, &place);
             row += 1;
             if row == rows {
                 column += 1;
                 row = if symmetry == Symmetry::Symmetric { column } else { 0 };
             }
         } else {
-            let row = place.index("row", place.word("row", &mut values)?)?;
-            let column = place.index("column", place.word("column", &mut values)?)?;
+            let row = place.next_index("row", &mut values)?;
+            let column = place.next_index("column", &mut values)?;
             if row.max(column) >= rows {
                 let found = format!("row {}, column {}", row + 1, column + 1);
                 return Err(place.fail("entry", found, format!("1 to {rows}"), ""));
             }
-            let value = place.number("entry", place.word("entry", &mut values)?)?;
-            triplets.push(row, column, value, &place);
+            triplets.push(row, column, place.next_number("entry", &mut values)?, &place);
         }
         place.end(&mut values)?;
     }
@@ -77,8 +71,7 @@ pub fn parse(text: Text<'_>) -> Result<LabelledMatrix, FeFileError> {
         let help = "is the file cut off?";
         return Err(header.fail("matrix", found, expected, help));
     }
-    let labels = triplets.unlabelled(rows, &header)?;
-    triplets.symmetric("the matrix", text.origin, labels, Storage::BySize)
+    triplets.unlabelled("the matrix", rows, &header, Storage::BySize)
 }
 
 fn size_of_array(rows: usize, symmetry: Symmetry) -> usize {

@@ -55,7 +55,7 @@ mod user_element;
 pub use assemble::{InterfaceMatrices, assemble_interfaces};
 pub use diagnose::diagnose_substructure;
 pub use interface::{Interface, InterfaceMap, RowPick, propose_map, propose_map_of};
-pub use matrix::{DofLabel, Entries, LARGEST_ASYMMETRY, LARGEST_DENSE, LabelledMatrix, MatrixRole, SparseSymmetric};
+pub use matrix::{DofLabel, Entries, LabelledMatrix, MatrixRole, SparseSymmetric};
 pub use matrix_market::write_matrix_market;
 pub use read::{ImportedMatrices, InputFile, MatrixNames, parse_matrices, read_matrices};
 pub use recognise::{MatrixFormat, recognise};

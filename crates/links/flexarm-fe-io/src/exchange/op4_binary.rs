@@ -1,4 +1,8 @@
 //! Nastran OUTPUT4 binary: Fortran records, little or big endian, dense or sparse, BIGMAT or not.
+//!
+//! Start at [`parse`]. A record has its length before and after it; the first one of a matrix is
+//! its header, each further one a column, and a column after the last one ends the matrix. Not
+//! here: text, and checks of the header ([`super::op4_text`]).
 
 use super::matrix::{LabelledMatrix, Triplets};
 use super::op4_text::Header;
@@ -36,38 +40,27 @@ pub(super) fn parse(bytes: &[u8], origin: &str) -> Result<Vec<LabelledMatrix>, F
 impl<'a> Records<'a> {
     fn fail(&self, what: &str, found: impl Into<Box<str>>, expected: &str) -> FeFileError {
         let element = format!("{what} before byte {}", self.at);
-        ErrorPosition::file(self.origin).fail(
-            element,
-            found,
-            expected,
-            "is the file cut off, or was it copied as text?",
-        )
+        let help = "is the file cut off, or was it copied as text?";
+        ErrorPosition::file(self.origin).fail(element, found, expected, help)
     }
 
-    fn word(&self, bytes: &[u8], i: usize) -> [u8; 4] {
-        let mut word = [0; 4];
-        word.copy_from_slice(&bytes[4 * i..4 * i + 4]);
+    /// Copies the first `N` bytes, the least significant one first.
+    fn little<const N: usize>(&self, bytes: &[u8]) -> [u8; N] {
+        let mut number = [0; N];
+        number.copy_from_slice(&bytes[..N]);
         if self.is_big_endian {
-            word.reverse();
+            number.reverse();
         }
-        word
+        number
     }
 
     /// Reads the 32-bit integer at word `i`, which must be in range.
     fn integer(&self, bytes: &[u8], i: usize) -> i32 {
-        i32::from_le_bytes(self.word(bytes, i))
+        i32::from_le_bytes(self.little(&bytes[4 * i..]))
     }
 
     fn number(&self, bytes: &[u8], is_double: bool) -> f64 {
-        if !is_double {
-            return f64::from(f32::from_le_bytes(self.word(bytes, 0)));
-        }
-        let mut eight = [0; 8];
-        eight.copy_from_slice(&bytes[..8]);
-        if self.is_big_endian {
-            eight.reverse();
-        }
-        f64::from_le_bytes(eight)
+        if is_double { f64::from_le_bytes(self.little(bytes)) } else { f32::from_le_bytes(self.little(bytes)).into() }
     }
 
     /// Reads the payload of the next record.
@@ -105,11 +98,8 @@ impl<'a> Records<'a> {
         }
         let data = usize::try_from(words).ok().and_then(|words| record[12..].get(..words.checked_mul(4)?));
         let Some(mut data) = data else {
-            return Err(self.fail(
-                &what,
-                format!("{words} words in {} bytes", record.len()),
-                "as many words as it says",
-            ));
+            let found = format!("{words} words in {} bytes", record.len());
+            return Err(self.fail(&what, found, "as many words as it says"));
         };
         if row > 0 {
             self.values(header, data, row, column, triplets)?;

@@ -8,8 +8,9 @@
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};
 use super::position::ErrorPosition;
-use super::text::{Text, shown, words};
+use super::text::{Text, words};
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Header of a matrix, in text and in binary files.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,14 +35,15 @@ impl Header {
         if !matches!(kind, 1 | 2) {
             return Err(refuse(format!("TYPE {kind}"), "1 or 2 (real)"));
         }
+        // A negative number of rows means BIGMAT.
+        let big = rows < 0;
         let size = |n: i64| u32::try_from(n.unsigned_abs()).map(|n| n as usize);
         match (size(columns), size(rows)) {
             (Ok(columns @ 1..), Ok(rows @ 1..)) => {
-                Ok(Self { name: name.to_ascii_uppercase(), columns, rows, big: false, is_double: kind == 2 })
+                Ok(Self { name: name.to_ascii_uppercase(), columns, rows, big, is_double: kind == 2 })
             }
             _ => Err(refuse(format!("{columns} columns, {rows} rows"), "1 to 4294967295")),
         }
-        .map(|header| Self { big: rows < 0, ..header })
     }
 
     /// Builds the symmetric matrix, or `None` for a rectangular one.
@@ -49,8 +51,7 @@ impl Header {
         if self.rows != self.columns {
             return Ok(None);
         }
-        let rows = triplets.unlabelled(self.rows, &ErrorPosition::file(origin))?;
-        triplets.symmetric(&self.name, origin, rows, Storage::BySize).map(Some)
+        triplets.unlabelled(&self.name, self.rows, &ErrorPosition::file(origin), Storage::BySize).map(Some)
     }
 
     /// Decodes the single integer of a string: length in words, and first row (from 1).

@@ -1,9 +1,14 @@
 //! Reads files into [`ImportedMatrices`]: recognises and parses each file, then selects stiffness
 //! and mass.
+//!
+//! Start at [`read_matrices`], which also finds the files that belong together, or at
+//! [`parse_matrices`] for bytes. Numbers remain in the units of the files.
+//! Not here: the formats (a module each), interfaces and units ([`super::assemble`]).
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use flexarm_fem::input::read_file;
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -11,10 +16,10 @@ use super::matrix::{DofLabel, LabelledMatrix, MatrixRole, Storage, reordered};
 use super::position::ErrorPosition;
 use super::recognise::{MatrixFormat, is_hdf5, recognise};
 use super::sidecar::Sidecar;
-use super::text::{LARGEST_UNPACKED, Text, unpack};
+use super::text::{LARGEST_UNPACKED, Text};
 use super::{abaqus_text, dmig, harwell_boeing, matrix_market, op4_binary, op4_text, sidecar, simscape, user_element};
 use crate::FeFileError;
-use flexarm_fem::input::read_file;
+use crate::unpack::plain;
 
 /// Names of the matrices to select in files with several (DMIG, OP4); `None`: by the letters K and
 /// M.
@@ -230,6 +235,7 @@ fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, FeF
         let plain = folder.join(name);
         if plain.exists() { plain } else { folder.join(format!("{name}.gz")) }
     };
+    // Each format lacks something: labels of rows, the mass, units and interfaces.
     let mut wanted = Vec::new();
     match recognise(&file.bytes) {
         Some(MatrixFormat::CoordinateText) if ending == "sti" => {
@@ -284,7 +290,7 @@ fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), FeFileE
         let place = ErrorPosition::file(origin);
         return Err(place.fail("file", found, expected, help));
     };
-    let bytes = unpack(&file.bytes, origin)?;
+    let bytes = plain(&file.bytes, origin, LARGEST_UNPACKED)?;
     let mut matrices = parse_format(format, &bytes, file, found)?;
     // A role given by the user takes precedence; if the file has several matrices, those with that
     // role are kept.
@@ -316,6 +322,7 @@ fn parse_format(
     let several = |list: Vec<LabelledMatrix>| list.into_iter().map(|m| (role_by_letter(&m.name), m)).collect();
 
     Ok(match format {
+        // Matrices; data of the whole file, such as labels and positions, go to `found`.
         MatrixFormat::MatrixMarket => one(matrix_market::parse(text)?),
         MatrixFormat::UserElement => user_element::parse(text)?.into_iter().map(|(role, m)| (Some(role), m)).collect(),
         MatrixFormat::LabelledText => {
@@ -324,6 +331,7 @@ fn parse_format(
             one(matrix)
         }
         MatrixFormat::CoordinateText => one(abaqus_text::parse_coordinate(text, storage_by_name(origin))?),
+        // Files without a matrix.
         MatrixFormat::DofList => {
             found.labels = Some((origin.into(), abaqus_text::parse_dof_list(text)?));
             Vec::new()
@@ -351,10 +359,8 @@ fn parse_format(
             Vec::new()
         }
         MatrixFormat::Sid => {
-            let help = "read it with parse_sid";
-            let expected = "stiffness and mass of interfaces";
-            let place = ErrorPosition::file(origin);
-            return Err(place.fail("file", "a modal body (SID)", expected, help));
+            let (found, expected) = ("a modal body (SID)", "stiffness and mass of interfaces");
+            return Err(ErrorPosition::file(origin).fail("file", found, expected, "read it with parse_sid"));
         }
     })
 }
@@ -434,6 +440,7 @@ fn choose(mut found: CombinedFiles, names: &MatrixNames, origin: &str) -> Result
         return Err(ErrorPosition::file(origin).fail("stiffness", nothing, "a stiffness", help));
     };
 
+    // Labels from a separate file, then the same order of rows.
     let Candidate { format, origin, matrix: mut K, .. } = stiffness;
     let mut M = mass.map(|mass| mass.matrix);
     if let Some((from, labels)) = found.labels {

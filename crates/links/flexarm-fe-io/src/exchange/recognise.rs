@@ -1,9 +1,13 @@
 //! Recognition of file formats by content, because file extensions are ambiguous: three formats use
 //! `.mtx`.
+//!
+//! Start at [`recognise`]. Formats with a mark of their own are tried first, then those without a
+//! header by the numbers in their first row. Not here: parsing ([`super::read`]).
 
 use std::fmt;
 
-use super::text::{real, unpack_head, words};
+use super::text::{unpack_head, words};
+use crate::number::real;
 
 /// Formats read by [`read_matrices`](super::read_matrices) and [`parse_sid`](super::parse_sid).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -91,6 +95,7 @@ pub fn recognise(bytes: &[u8]) -> Option<MatrixFormat> {
 fn recognise_text(head: &str) -> Option<MatrixFormat> {
     let lines: Vec<&str> = head.lines().filter(|line| !line.trim().is_empty()).take(20_000).collect();
     let first = lines.first()?.trim_start_matches('\u{feff}');
+    // Marks of a format.
     if starts_with(first, "%%MatrixMarket") {
         return Some(MatrixFormat::MatrixMarket);
     }
@@ -107,6 +112,7 @@ fn recognise_text(head: &str) -> Option<MatrixFormat> {
     if starts_with(keyword, "*USER ELEMENT") || starts_with(keyword, "*MATRIX") {
         return Some(MatrixFormat::UserElement);
     }
+    // Headers of fixed layout.
     if lines.get(2).is_some_and(|line| is_harwell_boeing_type(line)) {
         return Some(MatrixFormat::HarwellBoeing);
     }
@@ -117,6 +123,7 @@ fn recognise_text(head: &str) -> Option<MatrixFormat> {
     if lines.len() > 1 && is_op4_header(first, lines[1]) {
         return Some(MatrixFormat::Op4Text);
     }
+    // Rows of numbers without a header.
     let data = lines.iter().find(|line| !line.starts_with("**") && !line.starts_with('#'))?;
     recognise_row(data)
 }

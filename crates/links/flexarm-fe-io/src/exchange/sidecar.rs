@@ -16,12 +16,14 @@
 //! ```
 //! Rows after the interfaces are modal coordinates. The components of all interfaces are along the
 //! link axes; the rotation of a frame applies to its joint, not to the matrix.
+//! Start at [`Sidecar`]. Not here: the matrices ([`super::matrix_market`]).
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
 use serde::Deserialize;
 
 use super::interface::{Interface, InterfaceMap};
+use super::position::ErrorPosition;
 use super::text::Text;
 use crate::FeFileError;
 use flexarm_fem::units::UnitSystem;
@@ -89,7 +91,7 @@ fn no_rotation() -> [[f64; 3]; 3] {
 pub(super) fn parse(text: Text<'_>) -> Result<Sidecar, FeFileError> {
     let syntax = |error: toml::de::Error| {
         let line = error.span().map(|span| text.text.get(..span.start).unwrap_or("").matches('\n').count() + 1);
-        let place = super::position::ErrorPosition { line, ..text.file() };
+        let place = ErrorPosition { line, ..text.file() };
         let expected = "the keys format, version, stiffness, mass, units, [[interface]] with name, rows, xyz, rotation";
         place.fail("sidecar", error.message(), expected, "")
     };

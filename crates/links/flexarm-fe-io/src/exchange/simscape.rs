@@ -7,11 +7,12 @@ use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Quaternion, Translation3, UnitQuaternion};
 
 use super::matrix::{LabelledMatrix, Storage, Triplets};
+use super::position::ErrorPosition;
 use super::text::{Text, words};
 use crate::FeFileError;
 
 /// Lines with numbers, without comments.
-fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (super::position::ErrorPosition<'a>, &'a str)> + use<'a> {
+fn rows<'a>(text: &Text<'a>) -> impl Iterator<Item = (ErrorPosition<'a>, &'a str)> + use<'a> {
     text.lines().filter(|(_, line)| !line.trim().is_empty() && !line.starts_with(['#', '%']))
 }
 
@@ -33,8 +34,7 @@ pub(super) fn parse_matrix(text: Text<'_>) -> Result<LabelledMatrix, FeFileError
             return Err(place.fail("row", found, expected, "is the file cut off?"));
         }
     }
-    let labels = triplets.unlabelled(n, &text.file())?;
-    triplets.symmetric("the matrix", text.origin, labels, Storage::BySize)
+    triplets.unlabelled("the matrix", n, &text.file(), Storage::BySize)
 }
 
 /// Reads one frame per line: `x, y, z, qw, qx, qy, qz`.
@@ -44,7 +44,7 @@ pub(super) fn parse_frames(text: Text<'_>) -> Result<Vec<Pose>, FeFileError> {
         let mut values = words(line);
         let mut v = [0.0; 7];
         for value in &mut v {
-            *value = place.number("frame", place.word("frame", &mut values)?)?;
+            *value = place.next_number("frame", &mut values)?;
         }
         place.end(&mut values)?;
         let quaternion = Quaternion::new(v[3], v[4], v[5], v[6]);
@@ -75,6 +75,8 @@ pub struct SimscapeFiles {
 /// Writes stiffness, mass and interface frames for Simscape; SI, 17 digits, reads back bit for bit.
 ///
 /// * `name`: prefix of the file names in the script.
+/// * `K`, `M`: rows `[ux uy uz rx ry rz]` per interface, then modes, in link axes.
+/// * `frames`: pose of each interface in the link, translation in m.
 pub fn write_simscape(name: &str, K: &DMatrix<f64>, M: &DMatrix<f64>, frames: &[Pose]) -> SimscapeFiles {
     let matrix = |matrix: &DMatrix<f64>| -> String {
         let line = |values: Vec<String>| values.join(",") + "\n";

@@ -1,4 +1,8 @@
 //! Splits bytes into lines, words and numbers, as written by Fortran and C programs.
+//!
+//! Start at [`Text::lines`]; every line comes with its [`ErrorPosition`], whose methods read the
+//! words of the line and name them in errors.
+//! Not here: entries of Nastran ([`super::cards`]), fields of fixed width ([`super::fortran`]).
 
 use std::borrow::Cow;
 use std::io::Read;
@@ -7,19 +11,11 @@ use flate2::read::MultiGzDecoder;
 
 use super::position::ErrorPosition;
 use crate::FeFileError;
-use crate::unpack::{is_gzip, unpacked};
+use crate::number::{real, shown};
+use crate::unpack::is_gzip;
 
 /// Maximum unpacked size, bytes; a full model of 300 000 unknowns takes half of it.
 pub(super) const LARGEST_UNPACKED: u64 = 2 << 30;
-
-/// Returns the bytes, unpacked if they are compressed with gzip.
-pub(super) fn unpack<'b>(bytes: &'b [u8], origin: &str) -> Result<Cow<'b, [u8]>, FeFileError> {
-    if !is_gzip(bytes) {
-        return Ok(Cow::Borrowed(bytes));
-    }
-    let unpacked = unpacked(bytes, LARGEST_UNPACKED);
-    unpacked.map(Cow::Owned).map_err(|e| ErrorPosition::file(origin).fail("gzip data", e.found, e.expected, e.help))
-}
 
 /// Returns the first bytes, unpacked; an unpacking error ends the result silently.
 pub(super) fn unpack_head(bytes: &[u8], length: usize) -> Cow<'_, [u8]> {
@@ -61,26 +57,6 @@ pub(super) fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split([',', ' ', '\t', '\r']).filter(|word| !word.is_empty())
 }
 
-/// Parses a real number, also with the exponent letter D or without one, as in `1.5-3`.
-///
-/// NaN and infinity are returned; the caller rejects them.
-pub fn real(text: &str) -> Option<f64> {
-    let text = text.trim();
-    if let Ok(number) = text.parse() {
-        return Some(number);
-    }
-    // The sign of an exponent without a letter is the last sign after a digit or a point.
-    let bytes = text.as_bytes();
-    let digit = |i: usize| bytes[i].is_ascii_digit() || bytes[i] == b'.';
-    let exponent = (1..bytes.len()).rev().find(|&i| matches!(bytes[i], b'+' | b'-') && digit(i - 1));
-    let letters = |c| if matches!(c, 'd' | 'D') { 'e' } else { c };
-    let mended: String = match exponent {
-        Some(i) => format!("{}e{}", &text[..i], &text[i..]),
-        None => text.chars().map(letters).collect(),
-    };
-    mended.parse().ok()
-}
-
 impl ErrorPosition<'_> {
     /// Parses a finite number.
     pub(super) fn number(&self, element: &str, text: &str) -> Result<f64, FeFileError> {
@@ -94,20 +70,16 @@ impl ErrorPosition<'_> {
         }
     }
 
+    /// Parses an integer of either sign.
     pub(super) fn integer(&self, element: &str, text: &str) -> Result<i64, FeFileError> {
-        let wrong = || self.fail(element, shown(text), "a whole number", "");
-        text.trim().parse().map_err(|_| wrong())
+        text.trim().parse().ok().ok_or_else(|| self.fail(element, shown(text), "a whole number", ""))
     }
 
     /// Parses a row or column number from 1; returns it from 0.
     pub(super) fn index(&self, element: &str, text: &str) -> Result<usize, FeFileError> {
-        let wrong = || {
-            let expected = "a row or column number from 1 to 4294967295";
-            self.fail(element, shown(text), expected, "")
-        };
         match text.trim().parse::<u32>() {
             Ok(index) if index > 0 => Ok(index as usize - 1),
-            _ => Err(wrong()),
+            _ => Err(self.fail(element, shown(text), "a row or column number from 1 to 4294967295", "")),
         }
     }
 
@@ -115,27 +87,47 @@ impl ErrorPosition<'_> {
     pub(super) fn word<'w>(
         &self,
         element: &str,
-        words: &mut impl Iterator<Item = &'w str>,
+        words: &mut dyn Iterator<Item = &'w str>,
     ) -> Result<&'w str, FeFileError> {
         words.next().ok_or_else(|| self.fail(element, "the end of the line", "one more value", "is the file cut off?"))
     }
 
+    /// Reads the next word as an integer.
+    pub(super) fn next_integer(
+        &self,
+        element: &str,
+        words: &mut dyn Iterator<Item = &str>,
+    ) -> Result<i64, FeFileError> {
+        self.integer(element, self.word(element, words)?)
+    }
+
+    /// Reads the next word as a row or column number from 1; returns it from 0.
+    pub(super) fn next_index(
+        &self,
+        element: &str,
+        words: &mut dyn Iterator<Item = &str>,
+    ) -> Result<usize, FeFileError> {
+        self.index(element, self.word(element, words)?)
+    }
+
+    /// Reads the next word as a finite number.
+    pub(super) fn next_number(&self, element: &str, words: &mut dyn Iterator<Item = &str>) -> Result<f64, FeFileError> {
+        self.number(element, self.word(element, words)?)
+    }
+
+    /// Reads the numbers of rows and columns, which must be equal.
+    pub(super) fn square_size(&self, words: &mut dyn Iterator<Item = &str>) -> Result<usize, FeFileError> {
+        let rows = self.next_index("number of rows", words)? + 1;
+        let columns = self.next_index("number of columns", words)? + 1;
+        if rows == columns {
+            return Ok(rows);
+        }
+        Err(self.fail("size", format!("{rows} rows and {columns} columns"), "a square matrix", ""))
+    }
+
     /// Rejects anything after the last value of a line.
-    pub(super) fn end<'w>(&self, words: &mut impl Iterator<Item = &'w str>) -> Result<(), FeFileError> {
+    pub(super) fn end(&self, words: &mut dyn Iterator<Item = &str>) -> Result<(), FeFileError> {
         let Some(word) = words.next() else { return Ok(()) };
         Err(self.fail("line", shown(word), "the end of the line", ""))
-    }
-}
-
-/// Quotes text of a file, shortened.
-pub(super) fn shown(text: &str) -> String {
-    const LONGEST: usize = 40;
-    let text = text.trim();
-    if text.is_empty() {
-        return "nothing".into();
-    }
-    match text.char_indices().nth(LONGEST) {
-        Some((end, _)) => format!("{:?}...", &text[..end]),
-        None => format!("{text:?}"),
     }
 }

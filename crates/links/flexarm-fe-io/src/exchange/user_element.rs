@@ -8,8 +8,9 @@ use nalgebra::DMatrix;
 use super::fortran::fortran;
 use super::matrix::{DofLabel, LabelledMatrix, MatrixRole, Storage, Triplets};
 use super::position::ErrorPosition;
-use super::text::{Text, shown, words};
+use super::text::{Text, words};
 use crate::FeFileError;
+use crate::number::shown;
 
 /// Section of the file that the current lines belong to.
 enum Block {

@@ -1,4 +1,7 @@
 //! Data collected by a reader, and the checks that turn it into a [`Mesh`].
+//!
+//! Start at [`Draft::finish`]. A draft has the numbers and units of the file, a mesh indices and
+//! SI. Not here: formats ([`super::gmsh`], [`super::inp`]), quality of elements (`flexarm_fem`).
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -93,6 +96,7 @@ impl Draft {
         sets: Vec<(String, Vec<u32>)>,
         units: &UnitSystem,
     ) -> Result<(Mesh, Vec<String>), FeFileError> {
+        // Elements: node numbers to indices.
         let mut warnings = self.warnings;
         let mut blocks = Vec::with_capacity(self.blocks.len());
         for block in self.blocks.iter().filter(|block| !block.ids.is_empty()) {
@@ -104,6 +108,7 @@ impl Draft {
         }
         refuse_twins(src, &self.blocks, &blocks)?;
 
+        // Sets, sorted and without duplicates.
         let mut node_sets = BTreeMap::new();
         for (name, mut nodes) in sets {
             nodes.sort_unstable();
@@ -114,6 +119,7 @@ impl Draft {
             }
             node_sets.insert(name, nodes);
         }
+        // The mesh in SI; elements that are inside out are turned.
         let nodes = self.nodes.into_iter().map(|p| p * units.length).collect();
         let mut mesh = Mesh { nodes, node_ids: self.node_ids, blocks, regions: self.regions, node_sets };
         warnings.extend(turn_reversed(&mut mesh));

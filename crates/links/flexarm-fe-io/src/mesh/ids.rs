@@ -1,10 +1,8 @@
-//! Map from node or element numbers of a file to their indices.
+//! Map from node or element numbers of a file to their indices: a table, or pairs for sparse
+//! numbers.
 
 /// Lookup of unique numbers; memory is proportional to their count.
 pub enum IdIndex {
-    /// Numbers `first, first + 1, ...` in file order.
-    #[allow(missing_docs, reason = "named after what they are")]
-    Run { first: u64, count: u32 },
     /// Table over all numbers up to the largest; `NONE` for unused numbers.
     Table(Vec<u32>),
     /// Pairs sorted by number, for numbers with large gaps.
@@ -19,10 +17,6 @@ impl IdIndex {
     /// # Errors
     /// Returns the two positions of a duplicate number.
     pub fn new(ids: &[u64]) -> Result<Self, (usize, usize)> {
-        let first = ids.first().copied().unwrap_or(0);
-        if ids.iter().zip(0_u64..).all(|(id, k)| first.checked_add(k) == Some(*id)) {
-            return Ok(Self::Run { first, count: ids.len() as u32 });
-        }
         let largest = ids.iter().max().copied().unwrap_or(0);
         if largest < 8 * ids.len() as u64 + 1024 {
             let mut table = vec![NONE; largest as usize + 1];
@@ -46,7 +40,6 @@ impl IdIndex {
     /// Returns the index of a number.
     pub fn get(&self, id: u64) -> Option<u32> {
         match self {
-            Self::Run { first, count } => id.checked_sub(*first).filter(|k| *k < u64::from(*count)).map(|k| k as u32),
             Self::Table(table) => {
                 let slot = table.get(usize::try_from(id).ok()?)?;
                 (*slot != NONE).then_some(*slot)
@@ -61,10 +54,8 @@ impl IdIndex {
     /// Appends the indices of the existing numbers among `first, first + step, ... <= last`.
     pub fn extend_from_range(&self, first: u64, last: u64, step: u64, out: &mut Vec<u32>) {
         // Clipped to the existing numbers, which bounds the work for any range in the file.
-        let (low, high) = match self {
-            Self::Run { count: 0, .. } => return,
-            Self::Run { first, count } => (*first, *first + u64::from(*count) - 1),
-            Self::Table(table) => (0, table.len() as u64 - 1),
+        let high = match self {
+            Self::Table(table) => table.len() as u64 - 1,
             Self::Sorted(sorted) => {
                 let from = sorted.partition_point(|(id, _)| *id < first);
                 let within = sorted[from..].iter().take_while(|(id, _)| *id <= last);
@@ -72,9 +63,7 @@ impl IdIndex {
                 return;
             }
         };
-        let skipped = low.saturating_sub(first).div_ceil(step).checked_mul(step);
-        let Some(start) = skipped.and_then(|skipped| first.checked_add(skipped)) else { return };
-        let wanted = (start..=last.min(high)).step_by(usize::try_from(step).unwrap_or(usize::MAX));
+        let wanted = (first..=last.min(high)).step_by(usize::try_from(step).unwrap_or(usize::MAX));
         out.extend(wanted.filter_map(|id| self.get(id)));
     }
 }

@@ -1,16 +1,20 @@
 //! Reads a file into a checked mesh: recognises the format by content and calls its reader.
+//!
+//! Start at [`read_mesh`]. A format that cannot be read is named, with the way to convert it.
+//! Not here: the formats ([`super::gmsh`], [`super::inp`]), checks of the mesh ([`super::draft`]).
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use super::source::{Source, shown};
-use crate::FeFileError;
-use flexarm_fem::mesh::{BeamProperties, Mesh};
-
-use super::{gmsh, inp};
-use crate::unpack::{is_gzip, unpacked};
 use flexarm_fem::input::read_file;
+use flexarm_fem::mesh::{BeamProperties, Mesh};
 use flexarm_fem::units::UnitSystem;
+
+use super::source::Source;
+use super::{gmsh, inp};
+use crate::FeFileError;
+use crate::number::shown;
+use crate::unpack::plain;
 
 /// Maximum size of a file, bytes, compressed or not.
 const LARGEST: u64 = 8 << 30;
@@ -71,16 +75,8 @@ pub fn read_mesh(path: impl AsRef<Path>, options: &ReadOptions) -> Result<MeshFi
 /// # Errors
 /// As [`read_mesh`].
 pub fn parse_mesh(bytes: &[u8], origin: &str, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
-    let src = Source { bytes, origin, binary: false };
-    if is_gzip(bytes) {
-        let unpacked = unpacked(bytes, LARGEST)
-            .map_err(|error| src.error_in_file("gzip", error.found, error.expected).help(error.help))?;
-        return parse_plain(&Source { bytes: &unpacked, ..src }, options);
-    }
-    parse_plain(&src, options)
-}
-
-fn parse_plain(src: &Source, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
+    let bytes = plain(bytes, origin, LARGEST)?;
+    let src = &Source { bytes: &bytes, origin, binary: false };
     let text = src.bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(src.bytes).trim_ascii_start();
     if let Some((name, help)) = foreign(text) {
         let expected = "Gmsh .msh (2.2, 4.1), or .inp of CalculiX or Abaqus";

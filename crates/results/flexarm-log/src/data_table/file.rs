@@ -2,7 +2,8 @@
 //!
 //! Missing numbers and texts are null in the file; NaN counts as missing. The same table gives the
 //! same bytes on any machine: rows are written in groups of [`GROUP`], and nothing depends on the
-//! clock.
+//! clock. Start at [`DataTable::write`] and [`DataTable::read`].
+//! Not here: recordings of a run ([`crate::parquet_file`]).
 
 use std::fs::File;
 use std::path::Path;
@@ -24,6 +25,7 @@ use crate::whole_file::WholeFile;
 use crate::{CreateOptions, LogError};
 
 use super::{DataColumn, DataTable, DataValues};
+
 /// Number of rows per row group.
 const GROUP: usize = 65_536;
 
@@ -128,10 +130,8 @@ impl DataTable {
         parquet_table::read(path, || {
             let most = most_unpacked(file.metadata()?.len());
             let reader = parquet_table::open(file)?;
-            let metadata = reader.metadata().file_metadata();
-            let pairs = metadata.key_value_metadata().into_iter().flatten();
-            let texts = pairs.filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
-            let schema = metadata.schema_descr();
+            let texts = parquet_table::texts(&reader);
+            let schema = reader.metadata().file_metadata().schema_descr();
             let mut letters = 0;
             let columns = schema.columns().iter().enumerate().map(|(place, column)| {
                 let values = match column.physical_type() {

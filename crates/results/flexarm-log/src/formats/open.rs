@@ -48,6 +48,7 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
     if path.exists() && !path.is_file() {
         return refuse("what is not a file", "write it to a file first".into());
     }
+    // Magic bytes of a format, or text.
     let mut start = Vec::new();
     let file = std::fs::File::open(path).map_err(LogError::io(path, "open the recording"))?;
     file.take(64).read_to_end(&mut start).map_err(LogError::io(path, "read the recording"))?;
@@ -59,7 +60,9 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
         !magic.is_empty() && start.starts_with(magic)
     };
     let found = RecordingFormat::ALL.into_iter().find(begins);
-    let text = !start.contains(&0) && std::str::from_utf8(&start).is_ok_or_cut();
+    // A character may be cut at the end of the bytes that were read.
+    let is_utf8 = std::str::from_utf8(&start).map_or_else(|error| error.error_len().is_none(), |_| true);
+    let text = !start.contains(&0) && is_utf8;
     match found {
         Some(found) if found == expected => Ok(()),
         Some(found) => {
@@ -77,16 +80,5 @@ fn check_kind(path: &Path, expected: RecordingFormat) -> Result<(), LogError> {
             refuse(&format!("text, beginning {line:?}"), mend)
         }
         None => refuse("something else", "give a file that flexarm compare or run wrote".into()),
-    }
-}
-
-/// Whether text is valid UTF-8, apart from a character cut at the end.
-trait OkOrCut {
-    fn is_ok_or_cut(&self) -> bool;
-}
-
-impl OkOrCut for Result<&str, std::str::Utf8Error> {
-    fn is_ok_or_cut(&self) -> bool {
-        self.map_or_else(|error| error.error_len().is_none(), |_| true)
     }
 }

@@ -3,7 +3,10 @@
 //!
 //! Meshes are sent once and frames often, so the bent link moves as smoothly as the rest of the
 //! arm, at a hundredth of the bytes of a new surface per frame. Slabs overlap slightly, which hides
-//! the gaps between them.
+//! the gaps between them. Start at [`BentLink::slabs`] and [`BentLink::poses`].
+//!
+//! Frames: L link; all vectors in L, in m. Not here: the deflection line
+//! ([`flexarm_draw::BendLine`]).
 
 use flexarm_kinematics::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3, Vector3};
@@ -72,13 +75,13 @@ impl BentLink {
         let line = self.line.bent(&moved);
         let pose = |middle: &Vector3<f64>| {
             let at = line.deformed(middle);
-            // Rotation that maps the undeformed section directions e, f to the deformed ones u, v.
+            // Rotation R from the undeformed section directions e, f to the deformed ones u, v.
             let [u, v] = self.across.map(|e| line.deformed(&(middle + e)) - at);
             let [e, f] = self.across;
-            let turn =
+            let R =
                 Matrix3::from_columns(&[u, v, u.cross(&v)]) * Matrix3::from_columns(&[e, f, e.cross(&f)]).transpose();
-            let turn = Rotation3::from_matrix_unchecked(turn);
-            Pose::from_parts(Translation3::from(at - turn * middle), turn)
+            let R = Rotation3::from_matrix_unchecked(R);
+            Pose::from_parts(Translation3::from(at - R * middle), R)
         };
         self.middles.iter().map(pose).collect::<Vec<_>>().into_iter()
     }

@@ -1,7 +1,8 @@
 //! Topics of a recording: names, message types, quality of service.
 //!
 //! Every group of numbers is a `sensor_msgs/JointState`: Rerun, PlotJuggler and Foxglove label its
-//! curves by the names in the message.
+//! curves by the names in the message. Start at [`Channels::add`]. Channel numbers follow the order
+//! of the calls, so topics are added at the end. Not here: messages ([`super::messages`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::io;
@@ -10,6 +11,7 @@ use super::definitions::schema_text;
 use super::frames::is_magnified;
 use super::output::Output;
 use crate::RunHeader;
+use crate::table::distinct;
 
 /// Channel numbers of all topics. Topics of the rigid twin exist only if there is one.
 #[derive(Debug)]
@@ -34,7 +36,12 @@ pub(crate) struct Channels {
     pub(crate) solver: Named,
     pub(crate) energy: Named,
     pub(crate) events: u16,
-    pub(crate) markers: MarkerChannels,
+    /// Markers of surfaces; present if there are meshes.
+    pub(crate) surfaces: Option<u16>,
+    /// Markers of the paths of the TCP.
+    pub(crate) paths: u16,
+    /// Markers of the error; present if there is a magnified arm.
+    pub(crate) error_markers: Option<u16>,
 }
 
 /// Topic of named numbers, a `sensor_msgs/JointState`.
@@ -42,16 +49,6 @@ pub(crate) struct Channels {
 pub(crate) struct Named {
     pub(crate) channel: u16,
     pub(crate) names: Vec<String>,
-}
-
-/// Topics of markers.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MarkerChannels {
-    /// Present if there are meshes.
-    pub(crate) surfaces: Option<u16>,
-    pub(crate) paths: u16,
-    /// Present if there is a magnified arm.
-    pub(crate) error: Option<u16>,
 }
 
 /// Topics of the rigid twin and of the comparison with it.
@@ -71,6 +68,7 @@ const MARKERS: &str = "visualization_msgs/MarkerArray";
 impl Channels {
     /// Adds all topics of a run to the file.
     pub(crate) fn add(output: &mut Output, header: &RunHeader) -> io::Result<Self> {
+        // The robot, its frames and joints.
         let robot_description =
             add_if(!header.urdf.is_empty(), output, "/robot_description", "std_msgs/String", "URDF as read")?;
         let trees = "flexible robot with stations along its bent links; rigid twin below rigid/; magnified arm below magnified/";
@@ -80,18 +78,13 @@ impl Channels {
         let joint_states = add(output, "/joint_states", JOINTS, what)?;
         let tcp_flexible = add(output, "/tcp/flexible", POSE, "tool centre point of the flexible robot")?;
         let rigid = header.has_rigid.then(|| RigidChannels::add(output)).transpose()?;
-        let elements = topic_names(&header.elements).into_iter().zip(&header.elements);
-        let elastic = elements.map(|(topic, element)| {
-            let what = format!(
-                "load of {element} on its distal part, axes of the proximal face [N, N m], as in /elastic/joint_states"
-            );
-            add(output, &format!("/elastic/{topic}"), WRENCH, &what)
-        });
-        let elastic = elastic.collect::<io::Result<_>>()?;
+        // Elastic elements: a topic of each for arrows, and one of all for curves.
+        let elastic = wrenches(output, &header.elements)?;
         let what = "all elastic elements by name: position = deflection [m, rad], effort = load on the distal part [N, N m], axes of \
                     the proximal face";
         let names = parts(&header.elements, &ERROR[..6]);
         let elastic_joint_states = named_if(!header.elements.is_empty(), output, "/elastic/joint_states", names, what)?;
+        // Causes of the error, and measurements.
         let what = "static part of /tcp/error: the TCP error if the arm stood still where it is, world axes [m]";
         let wanted = header.has_rigid && header.has_static;
         let static_error = named_if(wanted, output, "/tcp/static_error", owned(&ERROR[..3]), what)?;
@@ -100,17 +93,18 @@ impl Channels {
         let contributions = named_if(!names.is_empty(), output, "/tcp/contributions", names, what)?;
         let what = "strain gauges [m/m] and stress points [Pa] of links";
         let gauges = named_if(!header.gauges.is_empty(), output, "/gauges", header.gauges.clone(), what)?;
+        // Pictures.
         let what = "surfaces of the links in their frames: flexible as in the URDF, rigid twin as a ghost, magnified arm in blue";
         let surfaces = add_if(!header.meshes.is_empty(), output, "/markers", MARKERS, what)?;
         let what = format!("TCP error from the rigid tool on, drawn {} times", header.magnification);
-        let error = add_if(is_magnified(header), output, "/markers/error", MARKERS, &what)?;
+        let error_markers = add_if(is_magnified(header), output, "/markers/error", MARKERS, &what)?;
+        // The solver, energies and events; the paths are the last topic.
         let solver = named(output, "/solver", owned(&["iterations", "residual"]), "stepper")?;
         let names = owned(&["kinetic", "potential", "elastic"]);
         let energy = named(output, "/energy", names, "energies of the flexible robot [J]")?;
         let what = "events; name = kind; written at the end of the run, with the times of the events";
         let events = add(output, "/events", "rcl_interfaces/Log", what)?;
         let paths = add(output, "/markers/path", MARKERS, "paths of the tool so far, each second")?;
-        let markers = MarkerChannels { surfaces, paths, error };
         Ok(Self {
             robot_description,
             tf,
@@ -126,7 +120,9 @@ impl Channels {
             solver,
             energy,
             events,
-            markers,
+            surfaces,
+            paths,
+            error_markers,
         })
     }
 }
@@ -149,6 +145,17 @@ impl RigidChannels {
 const ERROR: [&str; 7] = ["x", "y", "z", "rx", "ry", "rz", "norm"];
 /// Names of the parts of an error along the path.
 const PATH_ERROR: [&str; 6] = ["tangential", "normal", "binormal", "r_tangential", "r_normal", "r_binormal"];
+
+/// Adds a topic for the load of each elastic element.
+fn wrenches(output: &mut Output, elements: &[String]) -> io::Result<Vec<u16>> {
+    let wrench = |(topic, element): (String, &String)| {
+        let what = format!(
+            "load of {element} on its distal part, axes of the proximal face [N, N m], as in /elastic/joint_states"
+        );
+        add(output, &format!("/elastic/{topic}"), WRENCH, &what)
+    };
+    topic_names(elements).into_iter().zip(elements).map(wrench).collect()
+}
 
 fn owned(names: &[&str]) -> Vec<String> {
     names.iter().map(|&name| name.to_owned()).collect()
@@ -214,14 +221,9 @@ const AUTOMATIC: u8 = 1;
 pub fn topic_names(names: &[String]) -> Vec<String> {
     // `/elastic/joint_states` is taken.
     let mut taken = BTreeSet::from(["joint_states".to_owned()]);
-    let mut distinct = |base: String| {
-        let numbered = (2..).map(|n| format!("{base}_{n}"));
-        let mut candidates = std::iter::once(base.clone()).chain(numbered);
-        candidates.find(|name| taken.insert(name.clone())).unwrap_or(base)
-    };
     let valid = |name: &String| {
         let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
         if plain.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') { plain } else { format!("_{plain}") }
     };
-    names.iter().map(|name| distinct(valid(name))).collect()
+    names.iter().map(|name| distinct(valid(name), &mut taken)).collect()
 }

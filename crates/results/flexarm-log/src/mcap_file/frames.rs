@@ -1,5 +1,9 @@
 //! Coordinate frames of a recording: the trees of both robots and of the magnified arm, and their
 //! transforms.
+//!
+//! Start at [`Frames::transforms`]. Frames: W world, L link, S station, T tool; a transform is the
+//! pose `X_PC` of a child in its parent. Not here: encoding ([`super::messages`]), slabs
+//! ([`super::bent`]).
 
 use flexarm_kinematics::Pose;
 
@@ -87,6 +91,7 @@ impl Frames {
             moving: if link.fixed { Moving::No } else { Moving::Yes },
             names: all.map(|tree| tree.frame(&link.name)),
         };
+        // Frames of the TCP, of stations, and of slabs of bent links.
         let tcp = header.links.iter().position(|link| link.name == header.tcp);
         let station = |link: usize, k: usize| (link, format!("{}/station_{k}", header.links[link].name));
         let stations = header.bends.iter().flat_map(|bend| (0..bend.X_LS.len()).map(|k| station(bend.link, k)));

@@ -27,6 +27,7 @@ struct Curve {
 
 const GROUND: Ground = Ground::Dark;
 
+/// Plots with all their curves, without those that a run lacks.
 fn plots(header: &RunHeader) -> Vec<Plot> {
     let mut plots = Vec::new();
     let joint = |topic: &str, k: usize, name: &str, part: &str, color: Rgb| Curve {
@@ -36,6 +37,7 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
         name: name.to_owned(),
         color,
     };
+    // TCP error.
     if header.has_rigid {
         let world = ["x", "y", "z"].into_iter().enumerate();
         let mut curves: Vec<Curve> =
@@ -46,6 +48,7 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
         let curves = along.map(|(k, name)| joint("/tcp/error_path", k, name, "position", palette::series(k, GROUND)));
         plots.push(Plot { title: "TCP error along and across the path [m]", curves: curves.collect() });
     }
+    // Elastic elements.
     if !header.elements.is_empty() {
         let parts = ["x", "y", "z", "rx", "ry", "rz"];
         let names = header.elements.iter().flat_map(|name| parts.map(|part| format!("{name}/{part}")));
@@ -53,6 +56,7 @@ fn plots(header: &RunHeader) -> Vec<Plot> {
         let curves = names.enumerate().map(|(k, name)| joint("/elastic/joint_states", k, &name, "position", color(k)));
         plots.push(Plot { title: "Deflections [m, rad]", curves: curves.collect() });
     }
+    // Joints.
     for (title, part) in [("Joint efforts [N m, N]", "effort"), ("Joint positions [rad, m]", "position")] {
         let color = |k: usize| palette::series(header.color_number(&header.joints[k]), GROUND);
         let joints = header.joints.iter().enumerate();

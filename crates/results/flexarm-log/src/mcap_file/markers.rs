@@ -2,7 +2,8 @@
 //! the magnified TCP error.
 //!
 //! A viewer that jumps in time shows the last message of each topic, so data sent at different
-//! rates has separate topics: surfaces once, paths every second, the error more often.
+//! rates has separate topics: surfaces once, paths every second, the error more often. Start at
+//! [`surfaces`] and [`MovingMarkers`]. Not here: encoding of markers ([`super::messages`]).
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -11,6 +12,7 @@ use super::beat::Beat;
 use super::bent::BentLink;
 use super::frames::{Tree, WORLD, bending_tree, is_magnified, slab_frame};
 use super::messages::{Marker, MarkerKind};
+use crate::trace::halve;
 use crate::{LinkMesh, RunHeader, Sample, TwinSample};
 
 /// Maximum number of triangles of a robot; larger meshes are coarsened.
@@ -28,9 +30,11 @@ const ERROR: [f32; 4] = [0.9, 0.15, 0.15, 1.0];
 
 /// Returns the surfaces of all robots, in the frames of their links.
 pub(crate) fn surfaces<'a>(header: &RunHeader, frames: &'a SurfaceFrames) -> Vec<Marker<'a>> {
+    // Each mesh has its share of the triangles.
     let total: usize = header.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
     let share = |mesh: &LinkMesh| (mesh.triangles.len() as f64 / total as f64 * MAX_TRIANGLES as f64) as usize;
     let meshes: Vec<Cow<'_, LinkMesh>> = header.meshes.iter().map(|mesh| thinned(mesh, share(mesh).max(16))).collect();
+    // One marker per mesh and robot, or per slab of a bent link.
     let deviates = deviating(header);
     let mut markers = Vec::new();
     for (tree, frames) in &frames.trees {
@@ -121,6 +125,7 @@ pub fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
     if mesh.triangles.len() <= most {
         return Cow::Borrowed(mesh);
     }
+    // Corners in the same cell of a grid become one; the grid is made coarser until it suffices.
     let (low, high) = mesh.positions.iter().fold(([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]), |(low, high), p| {
         ([0, 1, 2].map(|c| low[c].min(p[c])), [0, 1, 2].map(|c| high[c].max(p[c])))
     });
@@ -148,14 +153,14 @@ pub fn thinned(mesh: &LinkMesh, most: usize) -> Cow<'_, LinkMesh> {
 pub struct Path {
     points: Vec<[f32; 3]>,
     stride: u64,
-    seen: u64,
+    samples: u64,
     last: [f32; 3],
 }
 
 impl Default for Path {
     /// Empty path.
     fn default() -> Self {
-        Self { points: Vec::new(), stride: 1, seen: 0, last: [0.0; 3] }
+        Self { points: Vec::new(), stride: 1, samples: 0, last: [0.0; 3] }
     }
 }
 
@@ -163,17 +168,13 @@ impl Path {
     /// Adds the TCP of a sample.
     pub fn push(&mut self, twin: &TwinSample) {
         self.last = twin.X_WT.translation.vector.map(|x| x as f32).into();
-        if self.seen.is_multiple_of(self.stride) {
+        if self.samples.is_multiple_of(self.stride) {
             self.points.push(self.last);
         }
-        self.seen += 1;
+        self.samples += 1;
         // The limit includes the last point.
         if self.points.len() >= MAX_POINTS {
-            let mut keep = false;
-            self.points.retain(|_| {
-                keep = !keep;
-                keep
-            });
+            halve(&mut self.points);
             self.stride *= 2;
         }
     }
@@ -224,7 +225,7 @@ impl MovingMarkers {
         sample: &Sample,
         magnified: Option<&TwinSample>,
     ) -> (bool, bool) {
-        if self.flexible.seen == 0 {
+        if self.flexible.samples == 0 {
             let base = sample.flexible.X_WL.first().map_or_else(Default::default, |X| X.translation.vector);
             self.reach = (sample.flexible.X_WT.translation.vector - base).norm();
         }

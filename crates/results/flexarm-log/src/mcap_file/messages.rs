@@ -1,7 +1,7 @@
 //! ROS 2 messages of a recording and their encoding: plain CDR, little endian [OMG DDSI-RTPS 2.5,
 //! section 10].
 //!
-//! CDR holds values without names, so a message is a tuple of its fields in the order of its
+//! CDR has values without names, so a message is a tuple of its fields in the order of its
 //! definition.
 
 use std::io;

@@ -174,12 +174,13 @@ impl McapFile {
         if let Some(channel) = self.channels.robot_description {
             output.send(channel, 0, start, &header.urdf)?;
         }
-        if let Some(channel) = self.channels.markers.surfaces {
+        if let Some(channel) = self.channels.surfaces {
             let frames = SurfaceFrames::of(header);
             let surfaces = markers::surfaces(header, &frames);
             output.send(channel, 0, start, messages::markers(start, &surfaces))?;
         }
 
+        // Names and units, for readers of other programs.
         let recording = [
             ("robot", header.robot.clone()),
             ("trajectory", header.trajectory.clone()),
@@ -196,6 +197,7 @@ impl McapFile {
             output.metadata(name, pairs.iter().cloned())?;
         }
 
+        // Files: the robot, its meshes, the set-up, and the header for readers of flexarm.
         let urdf = (!header.urdf.is_empty()).then(|| crate::Attachment {
             name: "robot.urdf".into(),
             media_type: "application/xml".into(),
@@ -207,6 +209,7 @@ impl McapFile {
         output.flush()
     }
 
+    /// Writes the messages of a sample. Their order is part of the format: frames come first.
     fn sample(&mut self, stamp: Stamp, sample: &Sample) -> io::Result<()> {
         self.transforms(stamp, sample)?;
         self.robot(self.channels.joint_states, self.channels.tcp_flexible, stamp, &sample.flexible)?;
@@ -268,7 +271,7 @@ impl McapFile {
         if paths {
             self.paths()?;
         }
-        if let Some(channel) = self.channels.markers.error.filter(|_| error) {
+        if let Some(channel) = self.channels.error_markers.filter(|_| error) {
             let arrow = self.markers.error(sample);
             self.output.send(channel, self.errors, stamp, messages::markers(stamp, &arrow))?;
             self.errors = self.errors.wrapping_add(1);
@@ -305,7 +308,7 @@ impl McapFile {
         if self.paths_at == Some(stamp) || paths.is_empty() {
             return Ok(());
         }
-        let channel = self.channels.markers.paths;
+        let channel = self.channels.paths;
         self.output.send(channel, self.paths, stamp, messages::markers(stamp, &paths))?;
         self.paths = self.paths.wrapping_add(1);
         self.paths_at = Some(stamp);

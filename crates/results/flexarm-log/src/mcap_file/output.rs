@@ -33,7 +33,7 @@ const KEPT_BYTES: usize = 2 * CHUNK_BYTES;
 pub(crate) struct Output {
     writer: Writer<NoSeek<WholeRecords>>,
     /// Size of the messages in the open chunk (bytes), and time of the first.
-    held: usize,
+    chunk_bytes: usize,
     begun: Option<Stamp>,
     /// Bytes of the last message; buffer reused.
     message: Vec<u8>,
@@ -52,7 +52,7 @@ impl Output {
         #[cfg(not(target_family = "wasm"))] // WebAssembly is built without zstd, which is C
         let options = options.compression_level(COMPRESSION).compression_threads(0);
         let writer = options.create(NoSeek::new(WholeRecords::new(file))).map_err(io_error)?;
-        Ok(Self { writer, held: 0, begun: None, message: Vec::new(), bag: Bag::default(), finished: false })
+        Ok(Self { writer, chunk_bytes: 0, begun: None, message: Vec::new(), bag: Bag::default(), finished: false })
     }
 
     /// Adds a topic of ROS 2 messages; returns its channel number.
@@ -77,7 +77,7 @@ impl Output {
         message: impl Serialize,
     ) -> io::Result<()> {
         encode(message, &mut self.message)?;
-        self.held += self.message.len();
+        self.chunk_bytes += self.message.len();
         self.begun.get_or_insert(stamp);
         self.bag.count(channel, stamp.0);
         let header = MessageHeader { channel_id: channel, sequence, log_time: stamp.0, publish_time: stamp.0 };
@@ -87,14 +87,14 @@ impl Output {
     /// Whether the chunk is to be closed. This depends only on the messages, never on the clock.
     pub(crate) fn is_full(&self, now: Stamp) -> bool {
         let begun = self.begun.unwrap_or(now);
-        self.held >= CHUNK_BYTES || now.0.saturating_sub(begun.0) >= CHUNK_NS
+        self.chunk_bytes >= CHUNK_BYTES || now.0.saturating_sub(begun.0) >= CHUNK_NS
     }
 
     /// Closes the chunk and writes everything so far to the file. After an error the file is
     /// unchanged.
     pub(crate) fn flush(&mut self) -> io::Result<()> {
         self.writer.flush().map_err(io_error)?;
-        (self.held, self.begun) = (0, None);
+        (self.chunk_bytes, self.begun) = (0, None);
         self.message.clear();
         self.message.shrink_to(KEPT_MESSAGE);
         Ok(())

@@ -1,4 +1,7 @@
 //! Reader of the CSV file of a run, line by line.
+//!
+//! Start at [`CsvRun`]. Errors have the line of the file; a last line that was cut off is left out
+//! with a warning. Not here: meaning of the columns ([`crate::table`]).
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};

@@ -1,4 +1,8 @@
 //! Reader of the Parquet file of a run, row group by row group.
+//!
+//! Start at [`ParquetRun`]; [`open`], [`column`] and [`read`] serve other tables too. Sizes that a
+//! file states are checked before memory is allocated for them.
+//! Not here: meaning of columns ([`crate::table`]) and texts ([`crate::described_table`]).
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -32,10 +36,7 @@ impl ParquetRun {
             let schema = groups.0.metadata().file_metadata().schema_descr();
             schema.columns().iter().map(|column| column.path().string()).collect()
         };
-        let pairs = groups.0.metadata().file_metadata().key_value_metadata();
-        let texts: Vec<(String, String)> =
-            pairs.into_iter().flatten().filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect();
-        let mut table = DescribedTable::of(path, &names, &texts)?;
+        let mut table = DescribedTable::of(path, &names, &texts(&groups.0))?;
         groups.check_columns(path, &table.layout.places)?;
         if !table.described && groups.0.num_row_groups() > 0 {
             let mut times = Vec::new();
@@ -128,6 +129,12 @@ pub(crate) fn open(file: File) -> Result<SerializedFileReader<File>, ParquetErro
         return Err(ParquetError::General(what));
     }
     Ok(reader)
+}
+
+/// Returns the texts of a file, as pairs of key and value.
+pub(crate) fn texts(reader: &SerializedFileReader<File>) -> Vec<(String, String)> {
+    let pairs = reader.metadata().file_metadata().key_value_metadata();
+    pairs.into_iter().flatten().filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?))).collect()
 }
 
 /// Reads a column of a row group; `None` for a missing value.

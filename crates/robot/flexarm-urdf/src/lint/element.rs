@@ -1,4 +1,8 @@
 //! Single elements: their attributes, checked and written to the plain text.
+//!
+//! Start at [`Lint::element`]. A fault is reported, and zeros replace the value, so that `urdf_rs`
+//! reads the rest. Not here: which elements a robot has ([`super`]), kinds of values
+//! ([`super::attribute`]).
 
 use std::fmt::Write as _;
 

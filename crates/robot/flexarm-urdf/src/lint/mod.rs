@@ -3,8 +3,8 @@
 //!
 //! Start at [`lint`]. The values of a robot come from `urdf_rs`. It drops words of a vector that
 //! are not numbers, treats a missing `<inertial>` as zeros, stops at the first fault and has no
-//! line numbers. The lint reports such faults with their places. It then writes a [`PlainUrdf`] text
-//! with the elements and attributes that a mechanism needs, as they are in the file, without
+//! line numbers. The lint reports such faults with their places. It then writes a [`PlainUrdf`]
+//! text with the elements and attributes that a mechanism needs, as they are in the file, without
 //! prefixes and with only the first of each element that may occur once. This has three reasons:
 //!
 //! * The parsers of `urdf_rs` recurse, and overflow the stack in a file of 100,000 nested elements.
@@ -18,10 +18,10 @@
 //!   plain text has the default or omits the element. A `<collision>` with a fault is omitted.
 //!
 //! The model takes five things from the tree that `urdf_rs::Robot` does not contain: the places of
-//! elements and whether they exist ([`OriginMark`]), the transmissions, the version (a bound that URDF
-//! 1.2 leaves open is written as infinite, as `urdf_rs` does itself), `acceleration`, `deceleration`
-//! and `jerk` of `<limit>`, which `urdf_rs` drops before version 1.2, and `quat_xyzw`, which it
-//! converts to angles that are wrong by up to 0.3 degrees near a pitch of 90.
+//! elements and whether they exist ([`OriginMark`]), the transmissions, the version (a bound that
+//! URDF 1.2 leaves open is written as infinite, as `urdf_rs` does itself), `acceleration`,
+//! `deceleration` and `jerk` of `<limit>`, which `urdf_rs` drops before version 1.2, and
+//! `quat_xyzw`, which it converts to angles that are wrong by up to 0.3 degrees near a pitch of 90.
 //!
 //! Not here: conclusions from the values ([`crate::raw`] and beyond).
 
@@ -163,9 +163,10 @@ impl Lint<'_, '_> {
             self.report.warning(&self.lines.of(second), "second-inertial", message, "remove one of them");
         }
         let visuals = all("visual").filter_map(|n| self.shape(n)).collect();
-        let heard = std::mem::take(self.report);
+        // Faults of collisions are not reported.
+        let kept = std::mem::take(self.report);
         let collisions = all("collision").filter_map(|n| self.shape(n)).collect();
-        *self.report = heard;
+        *self.report = kept;
         elements(node).for_each(|n| self.known_element(n, &LINK_CHILDREN));
         self.end("link");
         Some(LinkMarks { place: self.lines.of(node), inertial, visuals, collisions })
@@ -253,23 +254,25 @@ impl Lint<'_, '_> {
         let faults = self.report.issues.len();
         let name = self.name(node)?;
         elements(node).for_each(|n| self.known_element(n, &JOINT_CHILDREN));
+        // Links and frame.
         let kind = self.joint_type(node, name);
         self.start("joint", &[("name", name), ("type", kind)]);
         self.child(node, "parent", true, &[("link", Name, Fault)]);
         self.child(node, "child", true, &[("link", Name, Fault)]);
         let quaternion = self.origin(node);
+        // Axis and limits; `urdf_rs` needs all four bounds.
         let axis = self.child(node, "axis", false, &[("xyz", Numbers(3), As("1 0 0"))]);
         let (lower, upper) = if self.open_limits { ("-inf", "inf") } else { ("0", "0") };
         let bound = |name, missing| (name, Bound, As(missing));
         let limits = [bound("lower", lower), bound("upper", upper), bound("effort", "0"), bound("velocity", "0")];
         let limit = self.child(node, "limit", false, &limits);
         let rates = named(node, "limit").map_or([f64::INFINITY; 3], |limit| self.rates(limit));
+        // Leader of a follower.
         let factors = [("joint", Name, Fault), ("multiplier", Numbers(1), LeftOut), ("offset", Numbers(1), LeftOut)];
         let mimic = self.child(node, "mimic", false, &factors);
-        let second = elements(node).filter(|n| n.has_tag_name("mimic")).nth(1);
-        if let Some(second) = second {
-            let count = elements(node).filter(|n| n.has_tag_name("mimic")).count();
-            let message = format!("joint {name:?} has {count} <mimic>; a joint follows one other joint");
+        let mimics: Vec<_> = elements(node).filter(|n| n.has_tag_name("mimic")).collect();
+        if let [_, second, ..] = mimics[..] {
+            let message = format!("joint {name:?} has {} <mimic>; a joint follows one other joint", mimics.len());
             let help =
                 "keep one; a joint that depends on several is driven by a motion of its own or belongs to a [[loop]]";
             self.report.error(&self.lines.of(second), "several-mimics", message, help);
@@ -289,10 +292,7 @@ impl Lint<'_, '_> {
         let (place, owner) = (self.lines.of(limit), format!("{}, <limit>", self.owner));
         for name in limit.attributes().map(|attribute| attribute.name()).filter(|name| !KNOWN.contains(name)) {
             let message = format!("{owner}: the attribute {name:?} is not URDF and is ignored");
-            let help = match closest(name, KNOWN) {
-                Some(meant) => format!("did you mean {meant:?}?"),
-                None => format!("remove it, or use one of {}", KNOWN.join(", ")),
-            };
+            let help = did_you_mean(closest(name, KNOWN), &format!("remove it, or use one of {}", KNOWN.join(", ")));
             self.report.warning(&place, "unknown-attribute", message, help);
         }
         let [acceleration, deceleration, jerk] = RATES.map(|attribute| {

@@ -1,26 +1,22 @@
 //! glTF 2.0, binary or with separate buffers: triangles of the default scene, z up, node transforms
 //! applied.
 //!
-//! Not supported: textures, skins, sparse or packed accessors.
+//! Start at [`decode`]. Frames: N node, P its parent, F the file's axes (y up), V the URDF's visual
+//! frame, all in m. Not supported: textures, skins, sparse or packed accessors.
 
 use std::borrow::Cow;
 use std::path::Path;
 
-use nalgebra::{Matrix3, Matrix4, Quaternion, UnitQuaternion, Vector3, Vector4};
+use flexarm_files::read_file;
+use flexarm_settings::Finding;
+use nalgebra::{Matrix4, Quaternion, UnitQuaternion, Vector3};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
-use flexarm_settings::Finding;
-
-use super::collada::Transform;
 use super::{
-    LARGEST, MAX_TRIANGLES, TriangleMesh, check_inside, dominant_color, mesh_error, stl, unreadable, unsupported,
+    Draft, MAX_BYTES, MAX_DEPTH, MAX_INSTANCES, MAX_TRIANGLES, Transform, TriangleMesh, check_inside, mesh_error,
+    unreadable, unsupported, y_up,
 };
-
-/// Maximum nesting depth of nodes; a deeper one is treated as a cycle.
-const MAX_DEPTH: usize = 64;
-/// Maximum number of mesh instances in one file; more are rejected as malicious.
-const MAX_INSTANCES: usize = 100_000;
 
 /// What is read of the JSON part. Indices are not checked.
 #[derive(Default, Deserialize)]
@@ -131,29 +127,15 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Box<Find
         return Err(unsupported(path, feature));
     }
 
-    let mut reader = Reader {
-        path,
-        root: &root,
-        buffers: read_buffers(&root, blob, path)?,
-        mesh: TriangleMesh::default(),
-        normals: Vec::new(),
-        colors: Vec::new(),
-        instances: 0,
-    };
-    // glTF has y up: x, y, z of the file as columns in axes with z up.
-    let R = Matrix3::from_columns(&[Vector3::x(), Vector3::z(), -Vector3::y()]);
-    let T_V = R.to_homogeneous();
-    let scene = root.scenes.get(root.scene.unwrap_or(0));
-    match scene {
-        Some(scene) => scene.nodes.iter().try_for_each(|&node| reader.node(node, &T_V, 0))?,
-        None => root.meshes.iter().try_for_each(|mesh| reader.mesh(mesh, &T_V))?,
+    let mut reader =
+        Reader { path, root: &root, buffers: read_buffers(&root, blob, path)?, draft: Draft::default(), instances: 0 };
+    let T_VF = y_up().to_homogeneous();
+    match root.scenes.get(root.scene.unwrap_or(0)) {
+        Some(scene) => scene.nodes.iter().try_for_each(|&node| reader.node(node, &T_VF, 0))?,
+        // A file without scenes: every mesh once, in its own frame.
+        None => root.meshes.iter().try_for_each(|mesh| reader.mesh(mesh, &T_VF))?,
     }
-    let Reader { mut mesh, normals, colors, .. } = reader;
-    mesh.color = dominant_color(&colors);
-    if normals.len() == mesh.positions.len() {
-        mesh.normals = stl::usable(normals);
-    }
-    Ok(mesh)
+    Ok(reader.draft.finish())
 }
 
 fn malformed(path: &Path, reason: impl Into<String>) -> Box<Finding> {
@@ -163,7 +145,8 @@ fn malformed(path: &Path, reason: impl Into<String>) -> Box<Finding> {
 /// JSON and, of a binary file, the bytes after it.
 type Parts<'a> = (&'a [u8], Option<&'a [u8]>);
 
-/// Splits a file.
+/// Splits a file. A binary one has a header of 12 bytes (magic, version, length), then chunks, each
+/// with length, kind and content.
 fn parts<'a>(bytes: &'a [u8], path: &Path) -> Result<Parts<'a>, Box<Finding>> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
@@ -205,11 +188,7 @@ fn read_buffers<'a>(root: &Root, mut blob: Option<&'a [u8]>, path: &Path) -> Res
                     if !file.is_file() {
                         return Err(malformed(path, format!("its buffer {uri:?} is not beside it")));
                     }
-                    let large = std::fs::metadata(&file).is_ok_and(|meta| meta.len() > LARGEST);
-                    if large {
-                        return Err(malformed(path, format!("its buffer {uri:?} has more than {LARGEST} bytes")));
-                    }
-                    std::fs::read(&file).map_err(|error| unreadable(&file, error))?.into()
+                    read_file(&file, MAX_BYTES).map_err(|error| unreadable(&file, error))?.into()
                 }
             },
         };
@@ -220,7 +199,8 @@ fn read_buffers<'a>(root: &Root, mut blob: Option<&'a [u8]>, path: &Path) -> Res
 
 fn decode_base64(text: &str) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len() / 4 * 3);
-    let (mut bits, mut held) = (0u32, 0);
+    // Each letter has six bits; `bits` contains the last `count` of them that are not written yet.
+    let (mut bits, mut count) = (0u32, 0);
     for c in text.trim_end_matches('=').bytes() {
         let value = match c {
             b'A'..=b'Z' => c - b'A',
@@ -231,11 +211,11 @@ fn decode_base64(text: &str) -> Option<Vec<u8>> {
             _ => return None,
         };
         bits = (bits << 6) | u32::from(value);
-        held += 6;
-        if held >= 8 {
-            held -= 8;
-            bytes.push((bits >> held) as u8);
-            bits &= (1 << held) - 1;
+        count += 6;
+        if count >= 8 {
+            count -= 8;
+            bytes.push((bits >> count) as u8);
+            bits &= (1 << count) - 1;
         }
     }
     Some(bytes)
@@ -245,47 +225,38 @@ struct Reader<'a> {
     path: &'a Path,
     root: &'a Root,
     buffers: Vec<Cow<'a, [u8]>>,
-    mesh: TriangleMesh,
-    normals: Vec<[f32; 3]>,
-    colors: Vec<(Option<[f32; 4]>, usize)>,
+    draft: Draft,
     instances: usize,
 }
 
 impl Reader<'_> {
-    fn malformed(&self, reason: impl Into<String>) -> Box<Finding> {
-        malformed(self.path, reason)
-    }
-
-    fn unsupported(&self, feature: impl Into<String>) -> Box<Finding> {
-        unsupported(self.path, feature.into())
-    }
-
     /// Returns the element at an index, or an error if it does not exist.
     fn get<'b, T>(&self, list: &'b [T], index: usize, what: &str) -> Result<&'b T, Box<Finding>> {
-        list.get(index).ok_or_else(|| self.malformed(format!("{what} {index} does not exist")))
+        list.get(index).ok_or_else(|| malformed(self.path, format!("{what} {index} does not exist")))
     }
 
-    fn node(&mut self, index: usize, T_parent: &Matrix4<f64>, depth: usize) -> Result<(), Box<Finding>> {
+    /// Adds a node N and all nodes below it; `T_VP` is the transform of its parent.
+    fn node(&mut self, index: usize, T_VP: &Matrix4<f64>, depth: usize) -> Result<(), Box<Finding>> {
         self.instances += 1;
         if depth > MAX_DEPTH || self.instances > MAX_INSTANCES {
-            return Err(self.malformed("its nodes form a cycle or are far too many"));
+            return Err(malformed(self.path, "its nodes form a cycle or are far too many"));
         }
         let node = self.get(&self.root.nodes, index, "node")?;
-        let T = T_parent * local_transform(node);
+        let T_VN = T_VP * local_transform(node);
         if let Some(mesh) = node.mesh {
-            self.mesh(self.get(&self.root.meshes, mesh, "mesh")?, &T)?;
+            self.mesh(self.get(&self.root.meshes, mesh, "mesh")?, &T_VN)?;
         }
-        node.children.iter().try_for_each(|&child| self.node(child, &T, depth + 1))
+        node.children.iter().try_for_each(|&child| self.node(child, &T_VN, depth + 1))
     }
 
-    fn mesh(&mut self, mesh: &Mesh, T: &Matrix4<f64>) -> Result<(), Box<Finding>> {
-        let transform = Transform::new(T);
+    fn mesh(&mut self, mesh: &Mesh, T_VN: &Matrix4<f64>) -> Result<(), Box<Finding>> {
+        let transform = Transform::new(T_VN);
         for primitive in &mesh.primitives {
             match primitive.mode.unwrap_or(4) {
                 0..=3 => continue, // points and lines
                 4 => {}
-                5 | 6 => return Err(self.unsupported("strips and fans of triangles of glTF")),
-                mode => return Err(self.malformed(format!("a primitive has the unknown mode {mode}"))),
+                5 | 6 => return Err(unsupported(self.path, "strips and fans of triangles of glTF")),
+                mode => return Err(malformed(self.path, format!("a primitive has the unknown mode {mode}"))),
             }
             let Some(positions) = primitive.attributes.position else { continue };
             let positions = self.vectors(positions)?;
@@ -295,23 +266,25 @@ impl Reader<'_> {
                 None => (0..positions.len() as u32).collect(),
             };
             if let Some(index) = indices.iter().find(|&&i| i as usize >= positions.len()) {
-                return Err(self.malformed(format!("a triangle uses vertex {index} of {}", positions.len())));
+                return Err(malformed(self.path, format!("a triangle uses vertex {index} of {}", positions.len())));
             }
 
-            let total = self.mesh.positions.len() + positions.len();
-            if total > u32::MAX as usize || self.mesh.triangles.len() > MAX_TRIANGLES {
-                return Err(self.unsupported("more than 50 million triangles"));
+            let draft = &mut self.draft;
+            let total = draft.mesh.positions.len() + positions.len();
+            if total > u32::MAX as usize || draft.mesh.triangles.len() > MAX_TRIANGLES {
+                return Err(unsupported(self.path, "more than 50 million triangles"));
             }
-            let first = self.mesh.positions.len() as u32;
-            self.mesh.positions.extend(positions.iter().map(|p| transform.point(p)));
+            // Indices of a primitive start at its own first vertex.
+            let first = draft.mesh.positions.len() as u32;
+            draft.mesh.positions.extend(positions.iter().map(|p| transform.point(p)));
             if let Some(normals) = normals.filter(|n| n.len() == positions.len()) {
-                self.normals.extend(normals.iter().map(|n| transform.normal(n)));
+                draft.normals.extend(normals.iter().map(|n| transform.normal(n)));
             }
             let triangles = indices.chunks_exact(3).map(|t| transform.winding([t[0], t[1], t[2]].map(|i| i + first)));
-            self.mesh.triangles.extend(triangles);
+            draft.mesh.triangles.extend(triangles);
             let material = primitive.material.map(|index| self.get(&self.root.materials, index, "material"));
             let color = material.transpose()?.map(|m| m.pbr_metallic_roughness.base_color_factor.unwrap_or([1.0; 4]));
-            self.colors.push((color, indices.len() / 3));
+            self.draft.colors.push((color, indices.len() / 3));
         }
         Ok(())
     }
@@ -319,10 +292,10 @@ impl Reader<'_> {
     fn vectors(&self, index: usize) -> Result<Vec<Vector3<f64>>, Box<Finding>> {
         let accessor = self.get(&self.root.accessors, index, "accessor")?;
         if accessor.shape != "VEC3" {
-            return Err(self.malformed("positions and normals are not vectors"));
+            return Err(malformed(self.path, "positions and normals are not vectors"));
         }
         if accessor.component_type != F32 {
-            return Err(self.unsupported("packed vertices of glTF"));
+            return Err(unsupported(self.path, "packed vertices of glTF"));
         }
         let number = |b: &[u8]| f64::from(f32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let vector = |b: &[u8]| Vector3::new(number(b), number(&b[4..]), number(&b[8..]));
@@ -332,22 +305,22 @@ impl Reader<'_> {
     fn indices(&self, index: usize) -> Result<Vec<u32>, Box<Finding>> {
         let accessor = self.get(&self.root.accessors, index, "accessor")?;
         if accessor.shape != "SCALAR" {
-            return Err(self.malformed("its indices are not scalars"));
+            return Err(malformed(self.path, "its indices are not scalars"));
         }
         match accessor.component_type {
             U8 => self.elements(accessor, 1, |b| u32::from(b[0])),
             U16 => self.elements(accessor, 2, |b| u32::from(u16::from_le_bytes([b[0], b[1]]))),
             U32 => self.elements(accessor, 4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-            _ => Err(self.malformed("its indices are not unsigned integers")),
+            _ => Err(malformed(self.path, "its indices are not unsigned integers")),
         }
     }
 
     /// Reads the elements of `size` bytes each, with all bounds checked.
     fn elements<T>(&self, accessor: &Accessor, size: usize, read: impl Fn(&[u8]) -> T) -> Result<Vec<T>, Box<Finding>> {
         if accessor.sparse.is_some() {
-            return Err(self.unsupported("sparse accessors of glTF"));
+            return Err(unsupported(self.path, "sparse accessors of glTF"));
         }
-        let view = accessor.buffer_view.ok_or_else(|| self.unsupported("accessors of glTF without data"))?;
+        let view = accessor.buffer_view.ok_or_else(|| unsupported(self.path, "accessors of glTF without data"))?;
         let view = self.get(&self.root.buffer_views, view, "buffer view")?;
         let buffer = self.get(&self.buffers, view.buffer, "buffer")?;
         let stride = view.byte_stride.map_or(size, |stride| stride.max(size));
@@ -360,12 +333,13 @@ impl Reader<'_> {
             (Some(bytes), Some(span)) if span <= bytes.len() => {
                 Ok((0..count).map(|i| read(&bytes[i * stride..i * stride + size])).collect())
             }
-            _ => Err(self.malformed("an accessor reaches beyond its buffer")),
+            _ => Err(malformed(self.path, "an accessor reaches beyond its buffer")),
         }
     }
 }
 
-/// Transform of a node, from its matrix or its translation, rotation and scale.
+/// Transform `T_PN` of a node in its parent, from its matrix or its translation, rotation and
+/// scale.
 fn local_transform(node: &Node) -> Matrix4<f64> {
     if let Some(matrix) = node.matrix {
         return Matrix4::from_column_slice(&matrix.map(f64::from));
@@ -376,11 +350,4 @@ fn local_transform(node: &Node) -> Matrix4<f64> {
     Matrix4::new_translation(&vector(node.translation, Vector3::zeros()))
         * q.to_homogeneous()
         * Matrix4::new_nonuniform_scaling(&vector(node.scale, Vector3::repeat(1.0)))
-}
-
-impl Transform {
-    fn point(&self, p: &Vector3<f64>) -> [f32; 3] {
-        let q = self.T * Vector4::new(p.x, p.y, p.z, 1.0);
-        [q.x as f32, q.y as f32, q.z as f32]
-    }
 }

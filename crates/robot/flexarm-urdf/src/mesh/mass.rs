@@ -1,4 +1,8 @@
 //! Volume, centroid and inertia of the body enclosed by a mesh, as exact sums over tetrahedra.
+//!
+//! Start at [`TriangleMesh::mass_properties`]. All values are in m, in the axes of the mesh.
+//! Not here: densities and the sum over the shapes of a link (`inertia`), primitives
+//! ([`crate::Geometry::mass_properties`]).
 
 use std::collections::HashMap;
 
@@ -29,7 +33,7 @@ impl MassProperties {
 }
 
 impl TriangleMesh {
-    /// Returns the mass properties of the enclosed body.
+    /// Returns the mass properties of the enclosed body, in the axes of the mesh.
     ///
     /// Each triangle (a, b, c) forms a tetrahedron with a reference point; with d = a · (b × c):
     ///
@@ -37,7 +41,7 @@ impl TriangleMesh {
     /// V = Σ d/6,   V c = Σ d/24 (a+b+c),   ∫ r rᵀ = Σ d/120 (aaᵀ + bbᵀ + ccᵀ + (a+b+c)(a+b+c)ᵀ)
     /// ```
     /// Exact for a closed mesh, up to rounding. The reference is the centre of the bounding box, so
-    /// that a mesh far from its origin loses no digits.
+    /// that a mesh far from its origin loses no digits. The cost is linear in the triangles.
     pub fn mass_properties(&self) -> MassProperties {
         let (low, high) = self.bounds().unwrap_or_default();
         let reference = (low + high) * 0.5;
@@ -54,6 +58,7 @@ impl TriangleMesh {
             first += sum * (d / 24.0);
             second += (a * a.transpose() + b * b.transpose() + c * c.transpose() + sum * sum.transpose()) * (d / 120.0);
         }
+        // Triangles that face inward give the negative of all integrals.
         let inside_out = volume < 0.0;
         if inside_out {
             (volume, first, second) = (-volume, -first, -second);
@@ -93,6 +98,7 @@ impl TriangleMesh {
     /// Number of edges that are not traversed equally often in both directions.
     fn open_edges(&self, size: f64) -> usize {
         let welded = self.welded_by(size);
+        // Passes from the lower to the higher vertex minus those back, for each edge.
         let mut balance: HashMap<(u32, u32), i64> = HashMap::new();
         for triangle in &self.triangles {
             for side in 0..3 {

@@ -14,8 +14,8 @@
 //! `<up_axis>`, so that some robot files have a wrong one: [`UpAxis::Ignored`] reads them. The
 //! scale of the URDF is applied last ([`TriangleMesh::scaled`]).
 //!
-//! Start at [`load_mesh`]. Not here: finding files (`resolve`), placing shapes on links
-//! ([`crate::Visual`]).
+//! Start at [`load_mesh`]; every reader fills a [`Draft`]. Not here: finding files (`resolve`),
+//! placing shapes on links ([`crate::Visual`]).
 
 mod collada;
 mod gltf_file;
@@ -26,18 +26,23 @@ mod stl;
 
 use std::path::{Component, Path, PathBuf};
 
+use flexarm_files::read_file;
 use flexarm_kinematics::Pose;
 use flexarm_settings::Finding;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Matrix4, Vector3};
 
 pub use mass::MassProperties;
 pub use section::{CrossSection, cross_section};
 
 /// Maximum number of triangles including instances; more are rejected as malicious.
 const MAX_TRIANGLES: usize = 50_000_000;
+/// Maximum nesting depth of scene nodes; a deeper one is treated as a cycle.
+const MAX_DEPTH: usize = 64;
+/// Maximum number of scene nodes including instances; more are rejected as malicious.
+const MAX_INSTANCES: usize = 100_000;
 
 /// Maximum file size (bytes): 20 million triangles of a binary STL.
-const LARGEST: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 30;
 
 /// Triangles with shared vertices; counter-clockwise viewed from outside.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -80,17 +85,11 @@ pub enum UpAxis {
 /// Reads a mesh according to its format, which is recognised by the extension, otherwise by the
 /// content.
 ///
-/// # Errors
-/// Finding with the place and what is wrong; arbitrary bytes never cause a panic.
-pub fn load_mesh(path: impl AsRef<Path>) -> Result<TriangleMesh, Box<Finding>> {
-    load_mesh_with(path, UpAxis::Declared)
-}
-
-/// [`load_mesh`] with a choice for COLLADA.
+/// Returns the mesh in m, in the axes of the URDF's visual frame V, without the scale of the URDF.
 ///
 /// # Errors
-/// As [`load_mesh`].
-pub fn load_mesh_with(path: impl AsRef<Path>, up_axis: UpAxis) -> Result<TriangleMesh, Box<Finding>> {
+/// Finding with the place and what is wrong; arbitrary bytes never cause a panic.
+pub fn load_mesh(path: impl AsRef<Path>, up_axis: UpAxis) -> Result<TriangleMesh, Box<Finding>> {
     load_with_remarks(path.as_ref(), up_axis).map(|loaded| loaded.mesh)
 }
 
@@ -102,18 +101,9 @@ pub struct Loaded {
     pub remarks: Vec<String>,
 }
 
-/// [`load_mesh_with`] with remarks on what was left out.
+/// [`load_mesh`] with remarks on what was left out.
 pub fn load_with_remarks(path: &Path, up_axis: UpAxis) -> Result<Loaded, Box<Finding>> {
-    let io_error = |source: std::io::Error| unreadable(path, source);
-    // Devices and pipes are refused, since a read may never end.
-    let meta = std::fs::metadata(path).map_err(io_error)?;
-    if !meta.is_file() {
-        return Err(unreadable(path, "this is not a file; give the path of a regular one"));
-    }
-    if meta.len() > LARGEST {
-        return Err(unreadable(path, format!("{} bytes, more than the {LARGEST} that are read", meta.len())));
-    }
-    decode(&std::fs::read(path).map_err(io_error)?, path, up_axis)
+    decode(&read_file(path, MAX_BYTES).map_err(|error| unreadable(path, error))?, path, up_axis)
 }
 
 /// Decodes the bytes of a mesh file; `path` gives the extension, the name for messages, and the
@@ -201,7 +191,7 @@ fn format(bytes: &[u8], path: &Path) -> Option<Format> {
 
 /// Checks the invariants of every reader: indices in range, finite numbers, at least one triangle.
 fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), Box<Finding>> {
-    let malformed = |reason: String| mesh_error(path.display(), format!("not a sound mesh file: {}", reason));
+    let malformed = |reason: String| mesh_error(path.display(), format!("not a sound mesh file: {reason}"));
     if mesh.triangles.is_empty() {
         return Err(mesh_error(path.display(), "there are no triangles in it"));
     }
@@ -216,7 +206,10 @@ fn check(mesh: &TriangleMesh, path: &Path) -> Result<(), Box<Finding>> {
 }
 
 impl TriangleMesh {
-    /// Returns the mesh as a binary STL file.
+    /// Returns the mesh as a binary STL file, with normals computed from the triangles.
+    ///
+    /// # Panics
+    /// If a triangle has an index beyond `positions`; meshes that were read have none.
     pub fn to_stl(&self) -> Vec<u8> {
         let mut bytes = vec![0; 80];
         bytes.extend((self.triangles.len() as u32).to_le_bytes());
@@ -231,7 +224,9 @@ impl TriangleMesh {
         bytes
     }
 
-    /// Scales along the axes; negative factors mirror, and the triangles keep their outward side.
+    /// Scales along the axes by `scale`, whose entries are not zero; negative ones mirror, and the
+    /// triangles keep their outward side. Normals are scaled by the inverse, since they are
+    /// orthogonal to the surface.
     pub fn scaled(mut self, scale: &Vector3<f64>) -> Self {
         for p in &mut self.positions {
             *p = std::array::from_fn(|i| (f64::from(p[i]) * scale[i]) as f32);
@@ -248,7 +243,7 @@ impl TriangleMesh {
         self
     }
 
-    /// Transforms this mesh from B to A by `X_AB`.
+    /// Transforms a mesh given in B to A; `X_AB` is the pose of B in A, with the translation in m.
     pub fn transformed(mut self, X_AB: &Pose) -> Self {
         for p in &mut self.positions {
             let p_A = X_AB * nalgebra::Point3::from(p.map(f64::from));
@@ -262,7 +257,8 @@ impl TriangleMesh {
         self
     }
 
-    /// Minimum and maximum corner of the bounding box of all vertices; `None` without vertices.
+    /// Returns the minimum and maximum corner (m) of the bounding box of all vertices, in the axes
+    /// of the mesh; `None` without vertices.
     pub fn bounds(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let mut points = self.positions.iter().map(|p| Vector3::from(p.map(f64::from)));
         let first = points.next()?;
@@ -279,15 +275,66 @@ fn unit_normal(n: Vector3<f64>) -> [f32; 3] {
         .into()
 }
 
-/// Colour with the most triangles.
-fn dominant_color(parts: &[(Option<[f32; 4]>, usize)]) -> Option<[f32; 4]> {
-    let mut totals: Vec<([f32; 4], usize)> = Vec::new();
-    for &(color, count) in parts {
-        let Some(color) = color else { continue };
-        match totals.iter_mut().find(|(c, _)| *c == color) {
-            Some((_, total)) => *total += count,
-            None => totals.push((color, count)),
+/// Axes x, y, z of a file with y up, as columns in axes with z up.
+fn y_up() -> Matrix3<f64> {
+    Matrix3::from_columns(&[Vector3::x(), Vector3::z(), -Vector3::y()])
+}
+
+/// A mesh while its file is read.
+#[derive(Default)]
+struct Draft {
+    mesh: TriangleMesh,
+    /// Normals of the vertices that have one.
+    normals: Vec<[f32; 3]>,
+    /// Colour and number of triangles of each part.
+    colors: Vec<(Option<[f32; 4]>, usize)>,
+}
+
+impl Draft {
+    /// Returns the mesh with the colour of most triangles, and with normals if every vertex has a
+    /// unit vector; many STL files have zeros.
+    fn finish(mut self) -> TriangleMesh {
+        let mut totals: Vec<([f32; 4], usize)> = Vec::new();
+        for (color, count) in self.colors {
+            let Some(color) = color else { continue };
+            match totals.iter_mut().find(|(c, _)| *c == color) {
+                Some((_, total)) => *total += count,
+                None => totals.push((color, count)),
+            }
         }
+        self.mesh.color = totals.into_iter().max_by_key(|(_, total)| *total).map(|(color, _)| color);
+        let is_unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-2;
+        let usable = !self.normals.is_empty() && self.normals.len() == self.mesh.positions.len();
+        self.mesh.normals = Some(self.normals).filter(|normals| usable && normals.iter().all(is_unit));
+        self.mesh
     }
-    totals.into_iter().max_by_key(|(_, total)| *total).map(|(color, _)| color)
+}
+
+/// Transform `T_VG` of a part from its frame G to the visual frame V, for points, normals and the
+/// winding of triangles. It may scale and mirror.
+struct Transform {
+    T_VG: Matrix4<f64>,
+    /// Inverse transpose of the linear part.
+    normals: Matrix3<f64>,
+    mirrored: bool,
+}
+
+impl Transform {
+    fn new(T_VG: &Matrix4<f64>) -> Self {
+        let linear = T_VG.fixed_view::<3, 3>(0, 0).into_owned();
+        let normals = linear.try_inverse().map_or_else(Matrix3::identity, |inverse| inverse.transpose());
+        Self { T_VG: *T_VG, normals, mirrored: linear.determinant() < 0.0 }
+    }
+
+    fn point(&self, p_G: &Vector3<f64>) -> [f32; 3] {
+        (self.T_VG * p_G.push(1.0)).xyz().map(|x| x as f32).into()
+    }
+
+    fn normal(&self, n_G: &Vector3<f64>) -> [f32; 3] {
+        unit_normal(self.normals * n_G)
+    }
+
+    fn winding(&self, [a, b, c]: [u32; 3]) -> [u32; 3] {
+        if self.mirrored { [a, c, b] } else { [a, b, c] }
+    }
 }

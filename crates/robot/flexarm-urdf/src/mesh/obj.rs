@@ -3,9 +3,10 @@
 
 use std::path::Path;
 
+use flexarm_files::read_file;
 use flexarm_settings::Finding;
 
-use super::{TriangleMesh, check_inside, dominant_color, mesh_error, stl, unsupported};
+use super::{Draft, MAX_BYTES, TriangleMesh, check_inside, mesh_error, unsupported};
 
 pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Result<TriangleMesh, Box<Finding>> {
     let read_file = |file: &Path| {
@@ -13,11 +14,7 @@ pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Re
             remarks.push(reason.clone());
             return Err(std::io::Error::other(reason));
         }
-        // Only regular files are read: a name in the file must not lead to a device.
-        match std::fs::metadata(file) {
-            Ok(meta) if meta.is_file() => std::fs::read(file),
-            _ => Err(std::io::Error::other("not a file")),
-        }
+        read_file(file, MAX_BYTES)
     };
     let scene = mesh_loader::Loader::default().load_obj_from_slice_with_reader(bytes, path, read_file);
     let scene = scene.map_err(|error| mesh_error(path.display(), format!("not a sound OBJ file: {error}")))?;
@@ -26,13 +23,11 @@ pub(super) fn decode(bytes: &[u8], path: &Path, remarks: &mut Vec<String>) -> Re
 
 /// Merges all parts of a scene into one mesh.
 pub(super) fn merged(scene: mesh_loader::Scene, path: &Path) -> Result<TriangleMesh, Box<Finding>> {
-    let mut mesh = TriangleMesh::default();
-    let mut normals = Vec::new();
-    let mut colors = Vec::new();
+    let Draft { mut mesh, mut normals, mut colors } = Draft::default();
     for (i, part) in scene.meshes.into_iter().enumerate() {
+        // Indices of a part start at its own first vertex; overflow is reported below.
         let first = u32::try_from(mesh.positions.len()).unwrap_or(u32::MAX);
-        let shifted = part.faces.iter().map(|face| face.map(|index| index.saturating_add(first)));
-        mesh.triangles.extend(shifted);
+        mesh.triangles.extend(part.faces.iter().map(|face| face.map(|index| index.saturating_add(first))));
         colors.push((scene.materials.get(i).and_then(|m| m.color.diffuse), part.faces.len()));
         mesh.positions.extend(part.vertices);
         normals.extend(part.normals);
@@ -40,9 +35,5 @@ pub(super) fn merged(scene: mesh_loader::Scene, path: &Path) -> Result<TriangleM
     if mesh.positions.len() > u32::MAX as usize {
         return Err(unsupported(path, "more than 2^32 vertices".to_owned()));
     }
-    mesh.color = dominant_color(&colors);
-    if normals.len() == mesh.positions.len() {
-        mesh.normals = stl::usable(normals);
-    }
-    Ok(mesh)
+    Ok(Draft { mesh, normals, colors }.finish())
 }

@@ -36,11 +36,15 @@ const OPEN: f64 = 0.02;
 /// Loops overlap if their total area exceeds that of their hull by this factor.
 const OVERLAP: f64 = 1.001;
 
-/// Returns the section of meshes, all in the axes of one link L, with the plane y-z of S.
+/// Returns the section of meshes with the plane y-z of S.
 ///
-/// Loops within others are ignored. `None` if the plane does not intersect any mesh, or only
-/// touches one.
+/// * `meshes`: surfaces in the axes of one link L, in m.
+/// * `X_LS`: pose of S in L, with the translation in m.
+///
+/// Loops within others are ignored. Loops that overlap, and open ones, give their convex hull.
+/// `None` if the plane does not intersect any mesh, or only touches one.
 pub fn cross_section(meshes: &[TriangleMesh], X_LS: &Pose) -> Option<CrossSection> {
+    // Outlines of all meshes in the plane.
     let X_SL = X_LS.inverse();
     let (mut loops, mut points) = (Vec::new(), Vec::new());
     let (mut open, mut whole) = (0.0, 0.0);
@@ -54,11 +58,13 @@ pub fn cross_section(meshes: &[TriangleMesh], X_LS: &Pose) -> Option<CrossSectio
     if whole == 0.0 {
         return None;
     }
+    // The hull replaces outlines whose inside is not known.
     let hull = convex_hull(points);
     let of_hull = || polygon(&hull).map(|section| CrossSection { is_closed: false, ..section });
     if open > OPEN * whole || loops.len() > MAX_LOOPS {
         return of_hull();
     }
+    // Loops that are not nested are parts of one section.
     let outer = outermost(&loops);
     let sum = outer.iter().filter_map(|points| polygon(points)).reduce(joined)?;
     let largest = polygon(&hull)?;
@@ -112,12 +118,14 @@ fn cut(mesh: &TriangleMesh, X_SL: &Pose) -> Cut {
     join(&places, &segments)
 }
 
-/// Joins segments to loops.
+/// Joins segments to loops; each has the indices of its two ends in `places`.
 fn join(places: &[Vector2<f64>], segments: &[[usize; 2]]) -> Cut {
+    // Segments at each node.
     let mut at: Vec<Vec<usize>> = vec![Vec::new(); places.len()];
     for (k, segment) in segments.iter().enumerate() {
         segment.iter().for_each(|&node| at[node].push(k));
     }
+    // Follows unused segments from each first one until it returns to its start or ends.
     let mut used = vec![false; segments.len()];
     let mut cut = Cut { loops: Vec::new(), open: Vec::new(), length: 0.0, open_length: 0.0 };
     for first in 0..segments.len() {

@@ -5,9 +5,11 @@ use std::path::Path;
 
 use flexarm_settings::Finding;
 
-use super::{TriangleMesh, mesh_error, obj};
+use super::{Draft, TriangleMesh, mesh_error, obj};
 
+/// Size of the header before the number of triangles (bytes).
 const HEADER: usize = 80;
+/// Size of a triangle (bytes).
 const RECORD: usize = 50;
 
 /// Whether the size is that of a binary file with the number of triangles in its header.
@@ -24,7 +26,7 @@ fn size(triangles: u32) -> u64 {
 }
 
 pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Box<Finding>> {
-    let malformed = |reason: String| mesh_error(path.display(), format!("not a sound STL file: {}", reason));
+    let malformed = |reason: String| mesh_error(path.display(), format!("not a sound STL file: {reason}"));
     // Many exporters write "solid" into the header of binary files, so the size is decisive.
     let ascii = bytes.trim_ascii_start().starts_with(b"solid") && std::str::from_utf8(bytes).is_ok();
     if ascii && !has_binary_size(bytes) {
@@ -45,9 +47,9 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Box<Find
     }
     // Bytes after the last triangle (line ends, tool data) are ignored.
     let records = bytes[HEADER + 4..].chunks_exact(RECORD).take(count as usize);
-    let mut mesh = TriangleMesh::default();
-    let mut normals = Vec::new();
+    let Draft { mut mesh, mut normals, colors } = Draft::default();
     for record in records {
+        // A record has the normal, three vertices, and two bytes of attributes.
         let number =
             |i: usize| f32::from_le_bytes([record[4 * i], record[4 * i + 1], record[4 * i + 2], record[4 * i + 3]]);
         let vector = |i: usize| [number(3 * i), number(3 * i + 1), number(3 * i + 2)];
@@ -56,12 +58,5 @@ pub(super) fn decode(bytes: &[u8], path: &Path) -> Result<TriangleMesh, Box<Find
         normals.extend([vector(0); 3]);
         mesh.triangles.push([first, first + 1, first + 2]);
     }
-    mesh.normals = usable(normals);
-    Ok(mesh)
-}
-
-/// Returns the normals if they are unit vectors; many STL files have zero normals.
-pub(super) fn usable(normals: Vec<[f32; 3]>) -> Option<Vec<[f32; 3]>> {
-    let unit = |n: &[f32; 3]| (n.iter().map(|x| x * x).sum::<f32>() - 1.0).abs() < 1e-2;
-    (!normals.is_empty() && normals.iter().all(unit)).then_some(normals)
+    Ok(Draft { mesh, normals, colors }.finish())
 }

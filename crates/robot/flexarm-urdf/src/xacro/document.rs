@@ -1,4 +1,7 @@
 //! XML as a tree that can be copied, with the place of every element; parsing and writing.
+//!
+//! Start at [`parse`] and [`write`]. Not here: positions and syntax errors ([`crate::xml`]), the
+//! meaning of elements ([`super::process`]).
 
 use std::path::Path;
 use std::rc::Rc;
@@ -66,6 +69,7 @@ fn element(document: &Document<'_>, node: roxmltree::Node<'_, '_>, lines: &xml::
     let end = tag.find(|c: char| c.is_whitespace() || c == '>' || c == '/').unwrap_or(tag.len());
     let place = lines.of(node);
     let outer = node.parent_element();
+    // Namespaces declared at this element, which `roxmltree` lists with those of its parents.
     let declared = node.namespaces().filter_map(|ns| {
         let known = outer.is_some_and(|o| o.namespaces().any(|n| n.name() == ns.name() && n.uri() == ns.uri()));
         let name = ns.name().map_or_else(|| "xmlns".to_owned(), |prefix| format!("xmlns:{prefix}"));

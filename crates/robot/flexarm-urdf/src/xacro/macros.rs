@@ -1,15 +1,21 @@
-//! Macros: parameters and calls.
+//! Macros: definitions, parameters and calls.
+//!
+//! Start at [`Interpreter::define_macro`] and [`Interpreter::call_macro`]. The body of a macro is
+//! processed in a scope of its own, below that of the caller.
+//! Not here: other elements ([`super::process`]), tables of properties ([`super::scope`]).
 
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 use std::rc::Rc;
+
+use flexarm_settings::{Place, closest};
 
 use super::document::Element;
 use super::expression::ExpressionError;
 use super::expression::value::Value;
 use super::scope::{Scope, Table};
 use super::{Content, Interpreter, Outcome};
-use flexarm_settings::{Place, closest};
+use crate::report::did_you_mean;
 
 /// Maximum depth of nested calls; ROS's xacro fails at about 200.
 const MAX_CALLS: usize = 300;
@@ -109,6 +115,7 @@ impl Interpreter<'_> {
         self.called_macros.insert(called.name.clone());
         self.calls.push((called.name.clone(), at.clone()));
 
+        // Attributes give values of parameters; blocks and defaults give the rest.
         let local = Table::child(&inner_scope);
         let mut open: Vec<&Parameter> = called.parameters.iter().collect();
         for (name, value) in element.attributes.iter().filter(|(n, _)| Some(n.as_str()) != skipped) {
@@ -125,6 +132,7 @@ impl Interpreter<'_> {
         self.take_blocks(element, &called, &mut open, macros, scope, &local)?;
         self.take_defaults(&called, open, scope, &local, at)?;
 
+        // The body may define macros that are visible only inside of it.
         let content = self.children(&called.body.children, &Macros::within(&inner_macros), &local)?;
         self.calls.pop();
         Ok(content)
@@ -143,8 +151,9 @@ impl Interpreter<'_> {
     ) -> Outcome<()> {
         let at = &element.at;
         let content = self.children(&element.children, macros, scope)?;
-        let holder = Element { children: content.nodes, ..element.clone() };
-        let mut blocks = holder.elements();
+        let evaluated = Element { children: content.nodes, ..element.clone() };
+        let mut blocks = evaluated.elements();
+        // Blocks are assigned in the order of the parameters; too few or too many are an error.
         let wanted: Vec<&Parameter> = open.iter().copied().filter(|p| p.name.starts_with('*')).collect();
         open.retain(|p| !p.name.starts_with('*'));
         for parameter in wanted {
@@ -165,6 +174,8 @@ impl Interpreter<'_> {
         }
     }
 
+    /// Assigns the caller's property of the same name (`^`) or the default to the parameters that
+    /// the call does not give.
     fn take_defaults(
         &mut self,
         called: &Macro,
@@ -180,6 +191,7 @@ impl Interpreter<'_> {
                 true => self.property(scope, name).map_err(|e| self.fault(at, e))?,
                 false => None,
             };
+            // The default is evaluated in the caller's scope.
             let value = match (forwarded, &parameter.default) {
                 (Some(value), _) => value,
                 (None, Some(default)) => self.text(default, scope).map_err(|e| {
@@ -213,6 +225,7 @@ impl Interpreter<'_> {
         }
         let mut names: Vec<&str> = full.split('.').collect();
         let name = names.pop().unwrap_or_default();
+        // Each name before the last one is a namespace of macros and of properties.
         let (mut macros_there, mut scope_there) = (Some(macros.clone()), scope.clone());
         for space in names {
             macros_there = macros_there.and_then(|m| m.namespace(space));
@@ -240,10 +253,8 @@ impl Interpreter<'_> {
 fn unknown_parameter(called: &Macro, name: &str) -> ExpressionError {
     let known: Vec<&str> = called.parameters.iter().map(|p| p.name.as_str()).collect();
     let trouble = ExpressionError::new(format!("the macro {:?} has no parameter {name:?}", called.name));
-    match closest(name, known.iter().copied()) {
-        Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
-        None => trouble.help(format!("its parameters are {}", known.join(", "))),
-    }
+    trouble
+        .help(did_you_mean(closest(name, known.iter().copied()), &format!("its parameters are {}", known.join(", "))))
 }
 
 /// Parses parameters such as `a b:=1 c:='x y' d:=${e} f:=^ g:=^|2 *block **blocks`.

@@ -2,7 +2,7 @@
 //! in the order of the file).
 //!
 //! Start at [`expand`], which converts a file to one element tree as text, with the origin of each
-//! line. Modules: [`document`] holds XML as a tree, [`process`] implements the elements of xacro,
+//! line. Modules: [`document`] has XML as a tree, [`process`] implements the elements of xacro,
 //! [`macros`] and [`scope`] what they define, [`text`] splits attributes into pieces,
 //! [`expression`] and [`substitution`] evaluate the pieces, [`yaml`] reads `xacro.load_yaml`.
 //!
@@ -28,14 +28,15 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use flexarm_files::read_file;
+use flexarm_settings::{Finding, Place, Severity, closest};
+
 use document::Node;
 use expression::ExpressionError;
 use expression::value::{Value, int_of};
 
 use crate::resolve::Resolver;
 use crate::{UrdfError, xml};
-use flexarm_settings::Place;
-use flexarm_settings::{Finding, Severity, closest};
 
 /// Maximum work for one document, approximately the number of bytes read and written.
 const MAX_WORK: usize = 100_000_000;
@@ -160,9 +161,8 @@ impl<'a> Interpreter<'a> {
         let has_links = root.elements().any(|e| e.name == "link");
         let idle = self.defined_macros.difference(&self.called_macros).cloned();
         let idle_macros = if has_links { Vec::new() } else { idle.collect() };
-        let written = document::write(&root, &self.namespaces);
-        let origins = written.origins;
-        Ok(Expanded { text: written.text, origins, remarks: self.remarks, idle_macros })
+        let document::ExpandedText { text, origins } = document::write(&root, &self.namespaces);
+        Ok(Expanded { text, origins, remarks: self.remarks, idle_macros })
     }
 
     /// Warns about unused arguments, which are probably misspelt.
@@ -204,38 +204,31 @@ impl<'a> Interpreter<'a> {
 
     /// Reads a file that the document refers to.
     fn read(&mut self, path: &Path) -> Result<String, ExpressionError> {
-        let failed = |what: String| {
-            ExpressionError::new(format!("{} cannot be read: {what}", path.display()))
+        let bytes = read_file(path, MAX_BYTES).map_err(|error| {
+            ExpressionError::new(format!("{} cannot be read: {error}", path.display()))
                 .help("correct the path, or the package")
-        };
-        let meta = std::fs::metadata(path).map_err(|e| failed(e.to_string()))?;
-        if !meta.is_file() {
-            return Err(failed("it is no file".into()));
-        }
-        if meta.len() > MAX_BYTES {
-            return Err(failed(format!("it has {} MB, at most {} are read", meta.len() >> 20, MAX_BYTES >> 20)));
-        }
-        self.charge(meta.len() as usize)?;
-        let bytes = std::fs::read(path).map_err(|e| failed(e.to_string()))?;
+        })?;
+        self.charge(bytes.len())?;
         xml::decode(bytes, path).map_err(|issue| ExpressionError::new(issue.to_string()))
     }
 
-    /// Notes once that the robot, and so each recording of it, has values from outside the document.
+    /// Notes once that the robot, and so each recording of it, has values from outside the
+    /// document.
     fn note_source(&mut self, source: String) {
-        if !self.sources.contains(&source) {
+        if self.sources.insert(source.clone()) {
             let message = format!("the robot has values of {source}");
             self.remark(Severity::Note, "xacro-source", message, "recordings carry them");
-            self.sources.insert(source);
         }
     }
 
-    /// Creates an error at a place, with the enclosing calls and files.
+    /// Creates an error at a place, with the enclosing calls and files on a line each.
     fn fault(&self, at: &Place, trouble: ExpressionError) -> Box<Finding> {
         let calls = self.calls.iter().rev().map(|(name, at)| format!("in the macro {name:?}, called at {at}"));
         let outer = self.files[..self.files.len().saturating_sub(1)].iter().rev();
         let files = outer.map(|file| format!("included from {}", file.display()));
         let trail = shortened_trail(calls.chain(files).collect());
-        fault(at, trouble, &trail)
+        let lines: String = trail.iter().map(|step| format!("\n  {step}")).collect();
+        Box::new(Finding::error("xacro", at.to_string(), trouble.message + &lines, trouble.help))
     }
 
     fn remark(&mut self, severity: Severity, code: &'static str, message: String, help: &str) {
@@ -243,12 +236,6 @@ impl<'a> Interpreter<'a> {
             self.remarks.push(Finding { severity, ..Finding::warning(code, self.at.to_string(), message, help) });
         }
     }
-}
-
-/// Error at a place, with the enclosing calls and files on a line each.
-fn fault(at: &Place, trouble: ExpressionError, trail: &[String]) -> Box<Finding> {
-    let lines: String = trail.iter().map(|step| format!("\n  {step}")).collect();
-    Box::new(Finding::error("xacro", at.to_string(), trouble.message + &lines, trouble.help))
 }
 
 /// Keeps the ends of a long trail and omits the middle.

@@ -1,4 +1,8 @@
 //! Processing of xacro elements in the order of the file.
+//!
+//! Start at [`Interpreter::element`], for an element that remains, and [`Interpreter::child`],
+//! which distinguishes the elements of xacro. Later elements use what earlier ones define. Not
+//! here: macros ([`super::macros`]), text of attributes ([`super::text`]).
 
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -81,9 +85,11 @@ impl Interpreter<'_> {
         self.charge(ELEMENT).map_err(|e| self.fault(at, e))?;
         self.deeper().map_err(|e| self.fault(at, e))?;
         match name {
+            // Definitions leave nothing in the document.
             "property" => self.property_element(element, scope)?,
             "macro" => self.define_macro(element, macros)?,
             "arg" => self.declare_argument(element, scope)?,
+            // These are replaced by other elements.
             "include" => content.nodes.extend(self.include(element, macros, scope)?),
             "insert_block" => content.nodes.extend(self.insert_block(element, macros, scope)?),
             "if" | "unless" => {
@@ -94,6 +100,7 @@ impl Interpreter<'_> {
                     content.nodes.extend(self.children(&element.children, macros, scope)?.nodes);
                 }
             }
+            // These change the enclosing element, or make one with an evaluated name.
             "attribute" => {
                 let name = self.attribute_text(element, "name", scope)?;
                 let value = self.attribute_text(element, "value", scope)?;
@@ -308,6 +315,7 @@ impl Interpreter<'_> {
         if !spec.contains(['*', '?', '[']) || path.is_file() {
             return Ok(vec![path]);
         }
+        // Folders that match the parts of the path so far.
         let mut found = vec![PathBuf::new()];
         for part in path.components() {
             let name = part.as_os_str().to_string_lossy().into_owned();
@@ -315,6 +323,7 @@ impl Interpreter<'_> {
                 found.iter_mut().for_each(|folder| folder.push(part));
                 continue;
             }
+            // Entries that match this part; hidden ones only if the pattern starts with a dot.
             let mut next = Vec::new();
             for folder in &found {
                 let here = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };

@@ -133,7 +133,7 @@ pub(crate) fn is_name(name: &str) -> bool {
 }
 
 impl Interpreter<'_> {
-    /// Value of a name in a scope; a text is evaluated now, in the table that holds it.
+    /// Value of a name in a scope; a text is evaluated now, in the table that contains it.
     pub(crate) fn property(&mut self, scope: &Scope, name: &str) -> Result<Option<Value>, ExpressionError> {
         let mut table = scope;
         let entry = loop {

@@ -1,4 +1,8 @@
 //! Detection of the index orders of a SID file by identities of its numbers.
+//!
+//! Start at [`Sid::conventions`]. All matrices are in the units of the file, about the origin of
+//! the body frame and in its axes. Not here: parsing ([`super::parse`]), the link
+//! ([`super::modal`]).
 
 use nalgebra::{DMatrix, Matrix3};
 
@@ -64,29 +68,31 @@ impl GyroLayout {
 }
 
 impl Sid {
-    /// Inertia about the body frame origin, undeformed.
+    /// Inertia about the origin of the body frame, in its axes, undeformed (mass times length²).
     pub fn J0(&self) -> Matrix3<f64> {
         tensor(&self.J.m0())
     }
 
-    /// Derivative of the inertia with respect to shape coordinate `mode`, from 0.
+    /// Derivative of [`Sid::J0`] with respect to shape coordinate `mode`, from 0; zero if there is
+    /// none.
     pub fn J1(&self, mode: usize) -> Matrix3<f64> {
         tensor(&self.J.m1(mode))
     }
 
-    /// `Gr_j`, 3×3: rows and axes of one shape coordinate.
+    /// `Gr_j = -2 ∫ [s]x [φ_j]x dm`, 3×3: rows and axes of shape coordinate `mode`, from 0.
     pub fn Gr(&self, layout: GyroLayout, mode: usize) -> Matrix3<f64> {
         let at = |row, axis| entry(&self.Gr, row, layout.column(self.nq(), axis, mode));
         Matrix3::from_fn(at)
     }
 
-    /// `Ge_j`, nq×3: rows are shape coordinates, columns axes.
+    /// `Ge_j`, nq×3, of shape coordinate `mode`, from 0: row k is `2 ∫ φ_j × φ_k dm`, columns are
+    /// axes.
     pub fn Ge(&self, layout: GyroLayout, mode: usize) -> DMatrix<f64> {
         let nq = self.nq();
         DMatrix::from_fn(nq, 3, |row, axis| entry(&self.Ge, row, layout.column(nq, axis, mode)))
     }
 
-    /// `Oe` with columns xx yy zz xy xz yz, nq×6.
+    /// `Oe`, nq×6: row k is `∫ φ_kᵀ [ω]x² s dm` by the products xx yy zz xy xz yz of ω.
     pub fn Oe(&self, order: OeOrder) -> DMatrix<f64> {
         let columns = order.columns();
         DMatrix::from_fn(self.nq(), 6, |row, j| entry(&self.Oe, row, if j < 3 { j } else { columns[j - 3] }))

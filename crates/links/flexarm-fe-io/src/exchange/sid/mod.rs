@@ -1,9 +1,8 @@
 //! Standard Input Data of a flexible body (Wallrapp 1994): reads `.SID_FEM` files.
 //!
 //! A body with `nq` shape coordinates: mass integrals as Taylor series in these, and frames of
-//! nodes. Matrices are stored as the entries of the file; [`SidMatrix::m0`] and [`SidMatrix::m1`] return
-//! them dense. Indices of the first-order part are
-//! (row, mode, column).
+//! nodes. Matrices are stored as the entries of the file; [`SidMatrix::m0`] and [`SidMatrix::m1`]
+//! return them dense. Indices of the first-order part are (row, mode, column).
 //!
 //! Writers of this format differ in three places, which the file does not declare:
 //!
@@ -17,6 +16,7 @@
 //! [`Sid::conventions`].
 //!
 //! Units: those of the file; [`Sid::in_units`] converts to others.
+//! Not here: writing SID, the modal link itself (`flexarm_fem`).
 
 mod conventions;
 mod modal;
@@ -35,6 +35,22 @@ pub use parse::{parse_sid, read_sid};
 pub(super) const BODY_BLOCKS: [&str; 11] = ["mdCM", "J", "Ct", "Cr", "Me", "Gr", "Ge", "Oe", "ksigma", "Ke", "De"];
 /// Names of the matrices of a node.
 pub(super) const NODE_BLOCKS: [&str; 5] = ["origin", "phi", "psi", "AP", "sigma"];
+
+/// Allowed numbers of rows and columns of a block with `nq` shape coordinates; empty if any are.
+fn sizes_of(name: &str, nq: usize) -> Vec<(usize, usize)> {
+    match name {
+        "origin" | "mdCM" => vec![(3, 1)],
+        "phi" | "psi" => vec![(3, nq)],
+        "AP" => vec![(3, 3)],
+        "J" => vec![(6, 1), (3, 3)],
+        "Ct" | "Cr" => vec![(nq, 3)],
+        "Me" | "Ke" | "De" => vec![(nq, nq)],
+        "Gr" => vec![(3, 3 * nq)],
+        "Ge" => vec![(nq, 3 * nq)],
+        "Oe" => vec![(nq, 6)],
+        _ => Vec::new(),
+    }
+}
 
 /// Taylor series of a matrix in the shape coordinates, as stored in the file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -140,7 +156,7 @@ impl Sid {
 }
 
 impl SidMatrix {
-    /// Creates a constant matrix.
+    /// Creates a constant matrix of a body with `nq` shape coordinates.
     pub fn constant(nq: usize, m0: &DMatrix<f64>) -> Self {
         let mut matrix = Self { nrow: m0.nrows(), ncol: m0.ncols(), nq, ..Self::default() };
         for (place, value) in places(m0) {

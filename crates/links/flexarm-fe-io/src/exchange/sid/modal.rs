@@ -11,6 +11,9 @@
 //! `K0t`, `K0r`, `K0omega` and `K0F`, because it cannot be separated from `Oe` again. Column
 //! `i n + l` of a block: entry l for load i.
 //!
+//! Letters: s position in the undeformed link, φ_k shape of coordinate k, dm element of mass, all
+//! in link axes about Lo. Not here: index orders of the file ([`super::conventions`]).
+//!
 //! Source: Wallrapp (1994), *Mech. Struct. & Mach.* 22.
 
 use flexarm_spatial::Pose;
@@ -18,7 +21,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, 
 
 use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, symmetric};
 
-use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode};
+use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode, sizes_of};
 use crate::FeFileError;
 use crate::exchange::position::ErrorPosition;
 
@@ -29,7 +32,11 @@ const OE_COLUMNS: [usize; 6] = [0, 1, 2, 3, 5, 4];
 /// Maximum `|RᵀR - 1|` of a node frame: files have few digits.
 const ROTATION: f64 = 1e-6;
 
-/// Symmetric part of `A = ∫ s φᵀ dm`, from `φᵀ [ω]x² s` per product of ω.
+/// Symmetric part of `A = ∫ s φᵀ dm`, from `O = ∫ φᵀ [ω]x² s dm` per product `ω_i ω_j`.
+///
+/// ```text
+/// [ω]x² = ω ωᵀ - |ω|² 1  gives  O_ii = A_ii - tr A,  O_ij = A_ij + A_ji,  tr A = -(O_xx + O_yy + O_zz)/2
+/// ```
 fn from_centrifugal(O: [f64; 6]) -> Matrix3<f64> {
     let trace = -0.5 * (O[0] + O[1] + O[2]);
     let mut A = Matrix3::zeros();
@@ -48,10 +55,10 @@ fn skew_of(c: &Vector3<f64>) -> Matrix3<f64> {
 /// Converts Standard Input Data to a modal link.
 ///
 /// A is the first node that no coordinate moves (otherwise see [`modal_link_held_at`]); every other
-/// node becomes an interface, in file order. The names of the link and nodes are those of the comment
-/// `modal link | NAME | A | B ...`, otherwise `name` and the numbers of the nodes. Damping (`De`) is ignored.
-/// In a file without the block `K0omega` the centrifugal stiffening remains in `Oe` and therefore
-/// in N.
+/// node becomes an interface, in file order. The names of the link and nodes are those of the
+/// comment `modal link | NAME | A | B ...`, otherwise `name` and the numbers of the nodes. Damping
+/// (`De`) is ignored. In a file without the block `K0omega` the centrifugal stiffening remains in
+/// `Oe` and therefore in N.
 ///
 /// * `name`: name of the link, and of the data in messages.
 /// * `sid`: data in SI.
@@ -62,7 +69,7 @@ fn skew_of(c: &Vector3<f64>) -> Matrix3<f64> {
 /// does not match the number of modes.
 pub fn modal_link_from_sid(name: &str, sid: &Sid) -> Result<ModalLink, FeFileError> {
     check_sizes(name, sid)?;
-    of_node(name, sid, held_node(name, sid)?)
+    of_node(name, sid, still_node(name, sid)?)
 }
 
 /// As [`modal_link_from_sid`], with a given node as A, for any floating frame of the data.
@@ -86,11 +93,13 @@ pub fn modal_link_held_at(name: &str, sid: &Sid, node: i64) -> Result<ModalLink,
 ///
 /// * `A`: index of the clamped node.
 fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, FeFileError> {
+    // Checks of the whole file, before any number of it is used.
     let conventions = sid.conventions(name)?;
     if sid.ksigma.m0().iter().any(|x| *x != 0.0) {
         let help = "a modal link is free of stress where its coordinates are zero";
         return Err(fail(name, "ksigma", "initial stress", "zeros", help));
     }
+    // Interfaces: every node except A, with its shapes [phi; psi], linear first.
     let n = sid.nq();
     let names = node_names(sid);
     let interfaces = sid.nodes.iter().zip(&names).enumerate().filter(|(at, _)| *at != A);
@@ -106,6 +115,7 @@ fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, FeFileError> {
         return Err(fail(name, "frame", found, "a node that moves", help));
     }
 
+    // P_k = ∫ s φ_kᵀ dm: the symmetric part from J1 = 2 tr(Ps) 1 - 2 Ps, the skew part from C_r.
     let (Ct, Cr) = (sid.Ct.m0(), sid.Cr.m0());
     let C_r = Matrix3xX::from_fn(n, |a, k| Cr[(k, a)]);
     let P: Vec<Matrix3<f64>> = (0..n)
@@ -133,6 +143,7 @@ fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, FeFileError> {
         labels: sid.modes.clone(),
         X_LA: frame(name, &sid.nodes[A])?,
     };
+    // A is clamped: motion of its node is removed from all shapes.
     let link = if is_still(&sid.nodes[A]) { link } else { link.without_rigid_motion(&motion_of(&sid.nodes[A], n)) };
     if !(link.mass > 0.0) || !link.is_positive_definite() {
         let expected = "a positive mass, Me and Ke positive definite with A held";
@@ -146,38 +157,18 @@ fn fail(origin: &str, element: &str, found: impl Into<Box<str>>, expected: &str,
     ErrorPosition::file(origin).fail(element, found, expected, help)
 }
 
-/// Block with its name and allowed sizes.
-type Block<'a> = (&'a str, &'a SidMatrix, &'a [(usize, usize)]);
-
 /// Checks the sizes: those of a file were checked, but data built by the caller may have any size.
 fn check_sizes(origin: &str, sid: &Sid) -> Result<(), FeFileError> {
     let n = sid.nq();
-    let body: [Block<'_>; 9] = [
-        ("mdCM", &sid.mdCM, &[(3, 1)]),
-        ("J", &sid.J, &[(6, 1), (3, 3)]),
-        ("Ct", &sid.Ct, &[(n, 3)]),
-        ("Cr", &sid.Cr, &[(n, 3)]),
-        ("Me", &sid.Me, &[(n, n)]),
-        ("Gr", &sid.Gr, &[(3, 3 * n)]),
-        ("Ge", &sid.Ge, &[(n, 3 * n)]),
-        ("Oe", &sid.Oe, &[(n, 6)]),
-        ("Ke", &sid.Ke, &[(n, n)]),
-    ];
-    let of_nodes = sid.nodes.iter().flat_map(|node| {
-        let (vector, shapes): (&[_], &[_]) = (&[(3, 1)], &[(3, 0)]);
-        [
-            ("origin", &node.origin, vector),
-            ("phi", &node.phi, shapes),
-            ("psi", &node.psi, shapes),
-            ("AP", &node.AP, &[(3, 3)]),
-        ]
-    });
-    for (name, matrix, sizes) in body.into_iter().chain(of_nodes) {
-        // Shapes have one column per mode (columns 0 in the table).
-        let fits = sizes
-            .iter()
-            .any(|(rows, columns)| (matrix.nrow, matrix.ncol) == (*rows, if *columns == 0 { n } else { *columns }));
-        if !fits || n == 0 {
+    // Damping is not used.
+    let body = sid.blocks().filter(|(name, _)| *name != "De");
+    let of_nodes = sid
+        .nodes
+        .iter()
+        .flat_map(|node| [("origin", &node.origin), ("phi", &node.phi), ("psi", &node.psi), ("AP", &node.AP)]);
+    for (name, matrix) in body.chain(of_nodes) {
+        let sizes = sizes_of(name, n);
+        if n == 0 || !(sizes.is_empty() || sizes.contains(&(matrix.nrow, matrix.ncol))) {
             let found = format!("{} x {} with {n} modes", matrix.nrow, matrix.ncol);
             return Err(fail(origin, name, found, "the size of the standard", ""));
         }
@@ -303,7 +294,7 @@ fn motion_of(node: &SidNode, n: usize) -> Matrix6xX<f64> {
 }
 
 /// Index of the first node that no coordinate moves.
-fn held_node(origin: &str, sid: &Sid) -> Result<usize, FeFileError> {
+fn still_node(origin: &str, sid: &Sid) -> Result<usize, FeFileError> {
     sid.nodes.iter().position(is_still).ok_or_else(|| {
         let expected = "a node without displacement: interface A, at which the frame is tangent";
         let help = "say which node is A, or make the file with the proximal interface as its frame";

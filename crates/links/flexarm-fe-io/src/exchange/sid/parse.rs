@@ -1,12 +1,17 @@
-//! Parses text into a [`Sid`].
+//! Parses text into a [`Sid`]: nested blocks `name ... end name` of lines `key = value`.
+//!
+//! Start at [`parse_sid`]. The sizes of blocks are checked, and bounded by the size of the file.
+//! Not here: the meaning of the matrices ([`super::conventions`], [`super::modal`]).
 
 use std::iter::Peekable;
 use std::path::Path;
 
-use super::{BODY_BLOCKS, NODE_BLOCKS, Sid, SidMatrix, SidNode};
+use super::{BODY_BLOCKS, NODE_BLOCKS, Sid, SidMatrix, SidNode, sizes_of};
 use crate::FeFileError;
 use crate::exchange::position::ErrorPosition;
-use crate::exchange::text::{Text, shown, unpack, words};
+use crate::exchange::text::{LARGEST_UNPACKED, Text, words};
+use crate::number::shown;
+use crate::unpack::plain;
 
 /// Maximum number of shape coordinates; larger sizes are errors.
 const MAX_MODES: usize = 10_000;
@@ -22,7 +27,7 @@ const MAX_ENTRIES: (usize, usize) = (1 << 20, 16);
 /// [`FeFileError`] with file, line, element, value found and value expected.
 pub fn read_sid(path: impl AsRef<Path>) -> Result<Sid, FeFileError> {
     let file = crate::exchange::InputFile::open(path)?;
-    let bytes = unpack(&file.bytes, &file.origin)?;
+    let bytes = plain(&file.bytes, &file.origin, LARGEST_UNPACKED)?;
     parse_sid(&String::from_utf8_lossy(&bytes), &file.origin)
 }
 
@@ -109,12 +114,8 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         }
         if sid.modes.len() != promised {
             let found = format!("{} lines ielastq", sid.modes.len());
-            return Err(ErrorPosition::file(self.origin).fail(
-                "refmod",
-                found,
-                format!("{promised}, as nelastq says"),
-                "",
-            ));
+            let expected = format!("{promised}, as nelastq says");
+            return Err(ErrorPosition::file(self.origin).fail("refmod", found, expected, ""));
         }
         Ok(())
     }
@@ -158,6 +159,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
 
     /// Reads the matrices of the body up to `end modal`.
     fn body(&mut self, sid: &mut Sid) -> Result<(), FeFileError> {
+        // Blocks in any order; unknown ones are kept.
         let nq = sid.nq();
         let mut found: [Option<SidMatrix>; 11] = Default::default();
         while !self.take("end modal") {
@@ -169,6 +171,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
                 None => sid.others.push((key.to_owned(), matrix)),
             }
         }
+        // Initial stress and damping may be absent, which means zero.
         let shape = |ncol| SidMatrix { nrow: nq, ncol, nq, ..SidMatrix::default() };
         let mut missing = Vec::new();
         let mut take = |i: usize| {
@@ -230,18 +233,7 @@ fn check_sizes(
     most_entries: usize,
 ) -> Result<(), FeFileError> {
     let shape = (matrix.nrow, matrix.ncol);
-    let expected: &[(usize, usize)] = match name {
-        "origin" | "mdCM" => &[(3, 1)],
-        "phi" | "psi" => &[(3, nq)],
-        "AP" => &[(3, 3)],
-        "J" => &[(6, 1), (3, 3)],
-        "Ct" | "Cr" => &[(nq, 3)],
-        "Me" | "Ke" | "De" => &[(nq, nq)],
-        "Gr" => &[(3, 3 * nq)],
-        "Ge" => &[(nq, 3 * nq)],
-        "Oe" => &[(nq, 6)],
-        _ => &[],
-    };
+    let expected = sizes_of(name, nq);
     let fail = |found: String, expected: String| Err(end.fail(name, found, expected, ""));
     if matrix.order > 1
         || matrix.structure > 4
@@ -279,6 +271,7 @@ fn entry(
     let Some((kind, indices)) = key.strip_suffix(')').and_then(|key| key.split_once('(')) else {
         return Err(unexpected(place, key, &expected));
     };
+    // Indices from 0, and the value.
     let element = format!("{name}, {}", key.split_whitespace().collect::<String>());
     let indices = words(indices).map(|index| place.index(&element, index)).collect::<Result<Vec<_>, _>>()?;
     let value = place.number(&element, value)?;
@@ -293,12 +286,10 @@ fn entry(
             return Err(place.fail(element, shown(key), format!("{expected} in {size}"), ""));
         }
     };
+    // An entry may be repeated with the same value.
     match previous.filter(|previous| *previous != value) {
         None => Ok(()),
-        Some(previous) => {
-            let found = format!("{previous:e} and {value:e}");
-            Err(place.fail(element, found, "one value", ""))
-        }
+        Some(previous) => Err(place.fail(element, format!("{previous:e} and {value:e}"), "one value", "")),
     }
 }
 

@@ -1,4 +1,9 @@
 //! Collects the elements of a Gmsh file by physical group.
+//!
+//! Start at [`Collector::element`] and [`Collector::finish`]. Groups of volumes become regions,
+//! groups of lower dimension node sets, and groups of lines beams if the options name them.
+//! Not here: the layout of the file ([`super::msh2`], [`super::msh4`]), checks of the mesh
+//! ([`crate::mesh::draft`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -8,7 +13,8 @@ use crate::FeFileError;
 use crate::mesh::draft::Draft;
 use crate::mesh::ids::IdIndex;
 use crate::mesh::read::ReadOptions;
-use crate::mesh::source::{Source, shown};
+use crate::mesh::source::Source;
+use crate::number::shown;
 use flexarm_fem::mesh::{ElementKind, Mesh, Region};
 use flexarm_fem::spelling::listed;
 
@@ -129,6 +135,7 @@ impl Collector {
         groups: &[i64],
         nodes: &[u64],
     ) -> Result<(), FeFileError> {
+        // A volume belongs to one region.
         if let Some((kind, order)) = shape.solid {
             if let [first, second, ..] = groups {
                 let both = [first, second].map(|tag| format!("{:?}", self.name((3, *tag)))).join(" and ");
@@ -137,15 +144,11 @@ impl Collector {
                     .error(at, format!("element {id}"), found, "one physical volume")
                     .help("leave each volume in one physical group"));
             }
-            self.keep(
-                kind,
-                (3, groups.first().copied().unwrap_or(0)),
-                id,
-                at,
-                order.iter().map(|k| nodes[*k as usize]),
-            );
+            let key = (3, groups.first().copied().unwrap_or(0));
+            self.keep(kind, key, id, at, order.iter().map(|k| nodes[*k as usize]));
             return Ok(());
         }
+        // An element of lower dimension adds its nodes to the set of each of its groups.
         for tag in groups {
             let key = (shape.dim, *tag);
             let set = self.sets.entry(key).or_insert_with(|| GroupNodes { at, ..GroupNodes::default() });
@@ -168,6 +171,7 @@ impl Collector {
         Ok(())
     }
 
+    /// Adds an element to the region of a group.
     fn keep(&mut self, kind: ElementKind, key: GroupKey, id: u64, at: usize, nodes: impl Iterator<Item = u64>) {
         let region = *self.regions.entry(key).or_insert_with(|| {
             self.region_keys.push(key);

@@ -10,19 +10,21 @@ mod reader;
 pub(crate) mod shapes;
 
 use super::read::{MeshFile, ReadOptions};
-use super::source::{Source, shown};
+use super::source::Source;
 use crate::FeFileError;
+use crate::number::shown;
 use collector::Collector;
 use reader::{Layout, Reader};
 
 /// Reads a whole file.
 pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, FeFileError> {
     let mut reader = Reader { src: *src, pos: 0, layout: Layout::Ascii };
-    let mut header = None;
+    let mut version = None;
     let mut collector = Collector::new(!options.beams.is_empty());
     while let Some((section, at)) = next_section(&mut reader) {
-        match (section, header) {
-            (b"MeshFormat", _) => header = Some(mesh_format(&mut reader)?),
+        // Sections in any order, the format first; unknown ones are skipped.
+        match (section, version) {
+            (b"MeshFormat", _) => version = Some(mesh_format(&mut reader)?),
             (b"PhysicalNames", _) => {
                 // Also text in binary files.
                 let mut text = Reader { layout: Layout::Ascii, ..reader };
@@ -37,9 +39,9 @@ pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, FeF
                 let error = src.error(at, "mesh", "$PartitionedEntities", "a mesh in one piece");
                 return Err(error.help("in Gmsh use UnpartitionMesh and save again"));
             }
-            (b"Entities", Some(Header { version: 4, .. })) => msh4::entities(&mut reader, &mut collector)?,
-            (b"Nodes", Some(Header { version: 4, .. })) => msh4::nodes(&mut reader, &mut collector)?,
-            (b"Elements", Some(Header { version: 4, .. })) => msh4::elements(&mut reader, &mut collector)?,
+            (b"Entities", Some(4)) => msh4::entities(&mut reader, &mut collector)?,
+            (b"Nodes", Some(4)) => msh4::nodes(&mut reader, &mut collector)?,
+            (b"Elements", Some(4)) => msh4::elements(&mut reader, &mut collector)?,
             (b"Nodes", Some(_)) => msh2::nodes(&mut reader, &mut collector)?,
             (b"Elements", Some(_)) => msh2::elements(&mut reader, &mut collector)?,
             _ => {
@@ -51,23 +53,18 @@ pub(super) fn parse(src: &Source, options: &ReadOptions) -> Result<MeshFile, FeF
         reader.end_of(&name)?;
     }
 
-    let Some(header) = header else {
+    let Some(version) = version else {
         return Err(src.error_in_file("format", "no $MeshFormat", "a Gmsh mesh"));
     };
     let src = reader.src;
     let (mesh, warnings) = collector.finish(&src, options)?;
-    let format = match (header.version, src.binary) {
+    let format = match (version, src.binary) {
         (4, false) => "Gmsh MSH 4.1 text",
         (4, true) => "Gmsh MSH 4.1 binary",
         (_, false) => "Gmsh MSH 2 text",
         (_, true) => "Gmsh MSH 2 binary",
     };
     Ok(MeshFile { mesh, format, warnings, element_types: Default::default() })
-}
-
-#[derive(Clone, Copy)]
-struct Header {
-    version: u8,
 }
 
 /// Moves past the next line `$Name`; returns the name and its position.
@@ -101,8 +98,8 @@ fn skip_section(reader: &mut Reader, section: &[u8]) {
 }
 
 /// Reads `version file-type data-size` and, in binary files, the integer 1 that shows the byte
-/// order.
-fn mesh_format(reader: &mut Reader) -> Result<Header, FeFileError> {
+/// order. Returns the version, 2 or 4.
+fn mesh_format(reader: &mut Reader) -> Result<u8, FeFileError> {
     let at = reader.pos;
     let version_word = reader.word("version")?;
     let version = match version_word {
@@ -122,6 +119,7 @@ fn mesh_format(reader: &mut Reader) -> Result<Header, FeFileError> {
         return Err(reader.src.error(at, "$MeshFormat", found, expected));
     }
     if file_type == 1 {
+        // The integer 1 has its other end first if the byte order differs.
         reader.rest_of_line();
         reader.src.binary = true;
         reader.layout = Layout::Binary { big_endian: false, size: size as usize };
@@ -134,5 +132,5 @@ fn mesh_format(reader: &mut Reader) -> Result<Header, FeFileError> {
         }
         reader.layout = Layout::Binary { big_endian, size: size as usize };
     }
-    Ok(Header { version })
+    Ok(version)
 }

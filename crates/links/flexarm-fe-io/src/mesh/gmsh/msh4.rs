@@ -1,4 +1,8 @@
 //! Sections of MSH 4.1: the same numbers in the same order in text and binary.
+//!
+//! Start at [`entities`], [`nodes`] and [`elements`], one per section. Counts are checked against
+//! the remaining bytes before anything is allocated. Not here: encoding of numbers
+//! ([`super::reader`]), groups and regions ([`super::collector`]).
 
 use nalgebra::Vector3;
 

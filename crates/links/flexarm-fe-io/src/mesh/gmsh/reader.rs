@@ -1,7 +1,11 @@
 //! Reads the numbers of a Gmsh file in order, as text or in binary of either byte order.
+//!
+//! Start at [`Reader::int`], [`Reader::size`] and [`Reader::real`], which have the C types of the
+//! format. Not here: the order of the numbers ([`super::msh2`], [`super::msh4`]).
 
 use crate::FeFileError;
-use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
+use crate::mesh::source::Source;
+use crate::number::{real, shown, unsigned};
 
 /// Encoding of numbers.
 #[derive(Clone, Copy, PartialEq)]
@@ -62,14 +66,10 @@ impl<'a> Reader<'a> {
                 let at = self.pos;
                 let word = self.word(what)?;
                 let (digits, sign) = word.strip_prefix(b"-").map_or((word, 1), |digits| (digits, -1));
-                let value = parse_u64(digits).and_then(|value| i64::try_from(value).ok());
+                let value = unsigned(digits).and_then(|value| i64::try_from(value).ok());
                 value.map(|value| sign * value).ok_or_else(|| self.wrong(at, what, word, "an integer"))
             }
-            Layout::Binary { big_endian, .. } => {
-                let bytes = self.bytes::<4>(what)?;
-                let value = if big_endian { i32::from_be_bytes(bytes) } else { i32::from_le_bytes(bytes) };
-                Ok(i64::from(value))
-            }
+            Layout::Binary { .. } => Ok(i64::from(i32::from_le_bytes(self.bytes(what)?))),
         }
     }
 
@@ -79,17 +79,10 @@ impl<'a> Reader<'a> {
             Layout::Ascii => {
                 let at = self.pos;
                 let word = self.word(what)?;
-                parse_u64(word).ok_or_else(|| self.wrong(at, what, word, "an integer, not negative"))
+                unsigned(word).ok_or_else(|| self.wrong(at, what, word, "an integer, not negative"))
             }
-            Layout::Binary { big_endian, size: 4 } => {
-                let bytes = self.bytes::<4>(what)?;
-                let value = if big_endian { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) };
-                Ok(u64::from(value))
-            }
-            Layout::Binary { big_endian, .. } => {
-                let bytes = self.bytes::<8>(what)?;
-                Ok(if big_endian { u64::from_be_bytes(bytes) } else { u64::from_le_bytes(bytes) })
-            }
+            Layout::Binary { size: 4, .. } => Ok(u64::from(u32::from_le_bytes(self.bytes(what)?))),
+            Layout::Binary { .. } => Ok(u64::from_le_bytes(self.bytes(what)?)),
         }
     }
 
@@ -97,7 +90,8 @@ impl<'a> Reader<'a> {
     pub(super) fn id(&mut self, what: &str) -> Result<u64, FeFileError> {
         let at = self.pos;
         let value = self.int(what)?;
-        u64::try_from(value).map_err(|_| self.wrong(at, what, value.to_string().as_bytes(), "no negative number"))
+        let wrong = || self.wrong(at, what, value.to_string().as_bytes(), "no negative number");
+        u64::try_from(value).ok().ok_or_else(wrong)
     }
 
     /// Reads a real number, C `double`.
@@ -106,12 +100,9 @@ impl<'a> Reader<'a> {
             Layout::Ascii => {
                 let at = self.pos;
                 let word = self.word(what)?;
-                parse_f64(word).ok_or_else(|| self.wrong(at, what, word, "a number"))
+                std::str::from_utf8(word).ok().and_then(real).ok_or_else(|| self.wrong(at, what, word, "a number"))
             }
-            Layout::Binary { big_endian, .. } => {
-                let bytes = self.bytes::<8>(what)?;
-                Ok(if big_endian { f64::from_be_bytes(bytes) } else { f64::from_le_bytes(bytes) })
-            }
+            Layout::Binary { .. } => Ok(f64::from_le_bytes(self.bytes(what)?)),
         }
     }
 
@@ -147,10 +138,14 @@ impl<'a> Reader<'a> {
         Err(self.src.error(at, format!("end of ${section}"), shown(word), expected))
     }
 
+    /// Reads the bytes of a number, the least significant one first.
     fn bytes<const N: usize>(&mut self, what: &str) -> Result<[u8; N], FeFileError> {
-        let bytes = self.src.bytes[self.pos..].first_chunk::<N>().ok_or_else(|| self.ended(what))?;
+        let mut bytes = *self.src.bytes[self.pos..].first_chunk::<N>().ok_or_else(|| self.ended(what))?;
         self.pos += N;
-        Ok(*bytes)
+        if matches!(self.layout, Layout::Binary { big_endian: true, .. }) {
+            bytes.reverse();
+        }
+        Ok(bytes)
     }
 
     fn ended(&self, what: &str) -> FeFileError {

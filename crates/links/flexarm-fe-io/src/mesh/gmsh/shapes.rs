@@ -31,6 +31,7 @@ pub fn shape(number: i64) -> Option<Shape> {
         Some(Shape { name, dim: 3, nodes, solid: Some((kind, &order[..nodes])) })
     };
     match number {
+        // First and second order.
         1 => plain("2-node line", 1, 2),
         2 => plain("3-node triangle", 2, 3),
         3 => plain("4-node quadrangle", 2, 4),
@@ -50,6 +51,7 @@ pub fn shape(number: i64) -> Option<Shape> {
         17 => solid("20-node hexahedron", ElementKind::Hex20, HEX),
         18 => solid("15-node prism", ElementKind::Wedge15, WEDGE),
         19 => plain("13-node pyramid", 3, 13),
+        // Higher orders, which only count the nodes to skip.
         20 => plain("9-node triangle", 2, 9),
         21 => plain("10-node triangle", 2, 10),
         22 => plain("12-node triangle", 2, 12),

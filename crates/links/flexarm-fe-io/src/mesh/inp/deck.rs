@@ -1,4 +1,9 @@
 //! Reads the cards of a deck in order.
+//!
+//! Start at [`Deck::read`], which calls [`Deck::card`] for each keyword. Numbers and names remain
+//! as in the file, except that materials and sections are converted to SI. Not here: meaning of
+//! sets and sections for the mesh ([`super::finish`]), their data lines ([`super::sets`],
+//! [`super::properties`]).
 
 use std::collections::{BTreeSet, HashMap};
 
@@ -10,7 +15,8 @@ use super::sets::{Scope, Sets};
 use super::types::{Class, advice, class};
 use crate::FeFileError;
 use crate::mesh::draft::Draft;
-use crate::mesh::source::{Source, shown};
+use crate::mesh::source::Source;
+use crate::number::{real, shown};
 use flexarm_fem::units::UnitSystem;
 
 /// Contents of the cards.
@@ -88,6 +94,7 @@ impl<'a> Deck<'a> {
 
     /// Reads all cards up to the first step.
     pub(super) fn read(&mut self) -> Result<(), FeFileError> {
+        // Steps have loads and results, which do not concern the mesh.
         let mut in_steps = false;
         while let Some(card) = self.lines.card() {
             in_steps |= card.name == "STEP";
@@ -111,6 +118,7 @@ impl<'a> Deck<'a> {
             );
             self.draft.warnings.push(warning);
         }
+        // One warning for all other cards.
         if !self.ignored.is_empty() {
             let cards = self.ignored.iter().map(|(title, count)| match count {
                 1 => title.clone(),
@@ -122,13 +130,16 @@ impl<'a> Deck<'a> {
         Ok(())
     }
 
+    /// Reads one card with its data lines; unknown ones are noted and skipped.
     fn card(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
         match card.name.as_str() {
+            // Mesh.
             "NODE" => self.nodes(card),
             "ELEMENT" => self.element_card(card),
             "NSET" | "ELSET" => self.set(card),
             "SURFACE" => self.surface(card),
+            // Materials, each followed by its properties, and sections.
             "MATERIAL" => {
                 let new = MaterialCard::new(&src, card)?;
                 if self.material_by_name.insert(squeezed(&new.name), self.materials.len()).is_some() {
@@ -152,15 +163,11 @@ impl<'a> Deck<'a> {
                 Ok(())
             }
             "BEAMSECTION" => {
-                self.sections.push(SectionCard::beam(
-                    &mut self.lines,
-                    card,
-                    self.scope,
-                    &self.units,
-                    &mut self.draft.warnings,
-                )?);
+                let warnings = &mut self.draft.warnings;
+                self.sections.push(SectionCard::beam(&mut self.lines, card, self.scope, &self.units, warnings)?);
                 Ok(())
             }
+            // Structure of the deck.
             "INCLUDE" => {
                 let found = format!("*INCLUDE of {:?}", card.get("INPUT").unwrap_or(""));
                 Err(card
@@ -181,7 +188,8 @@ impl<'a> Deck<'a> {
     }
 
     fn ignore(&mut self, card: &Card) {
-        const MAX: usize = 100; // names in a message
+        // Number of names in a message.
+        const MAX: usize = 100;
         match self.ignored.iter().position(|(title, _)| *title == card.title) {
             Some(k) => self.ignored[k].1 += 1,
             None if self.ignored.len() < MAX => self.ignored.push((card.title.clone(), 1)),
@@ -209,6 +217,7 @@ impl<'a> Deck<'a> {
     /// Reads `*NODE`: number, x, y, z.
     fn nodes(&mut self, card: &Card) -> Result<(), FeFileError> {
         let src = self.lines.src;
+        // Nodes of the assembly belong to no part: they carry couplings and loads, no elements.
         if self.scope == Scope::Assembly {
             self.draft.warnings.push("reference points of the assembly were left out".to_owned());
             self.assembly_nodes = true;
@@ -222,11 +231,14 @@ impl<'a> Deck<'a> {
         while let Some((at, line)) = self.lines.data() {
             let mut words = fields(line);
             let id = id(&src, at, "*NODE", words.next().unwrap_or(b""))?;
+            // A coordinate that is missing or empty is zero.
             let mut p = Vector3::zeros();
             for (x, word) in p.iter_mut().zip(words) {
                 *x = match word {
                     b"" => 0.0,
-                    _ => crate::mesh::source::parse_f64(word)
+                    _ => std::str::from_utf8(word)
+                        .ok()
+                        .and_then(real)
                         .ok_or_else(|| src.error(at, format!("node {id}"), shown(word), "a coordinate"))?,
                 };
             }
@@ -245,6 +257,7 @@ impl<'a> Deck<'a> {
 
     /// Reads `*ELEMENT`: number and nodes, over one or more lines.
     fn element_card(&mut self, card: &Card) -> Result<(), FeFileError> {
+        // Type and set of the card.
         let src = self.lines.src;
         let type_name = squeezed(card.need(&src, "TYPE")?);
         let Some((class, remark)) = class(&type_name) else {
@@ -267,6 +280,7 @@ impl<'a> Deck<'a> {
         let group = elements.groups.len() as u32 - 1;
         let type_name = &elements.groups[group as usize].type_name;
 
+        // Elements; one with many nodes continues in further lines.
         let first = elements.ids.len();
         let each = class.nodes();
         while let Some((at, line)) = self.lines.data() {

@@ -1,16 +1,19 @@
 //! Builds a mesh from the cards: resolves sets and sorts elements into regions.
+//!
+//! Start at [`Deck::finish`]. A region is a section, or without sections the set of an element
+//! card. Not here: reading the cards ([`super::deck`]), checks and units ([`crate::mesh::draft`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::deck::{Deck, Surface};
 use super::lines::squeezed;
 use super::properties::SectionCard;
-use super::sets::{Budget, Scope, unknown};
+use super::sets::{Budget, Scope};
 use super::types::Class;
 use crate::FeFileError;
 use crate::mesh::ids::IdIndex;
 use crate::mesh::read::ReadOptions;
-use crate::mesh::source::parse_u64;
+use crate::number::unsigned;
 use flexarm_fem::beam::BeamTheory;
 use flexarm_fem::mesh::{ElementKind, Mesh, Region, face_nodes};
 use flexarm_fem::spelling::listed;
@@ -100,6 +103,7 @@ impl Deck<'_> {
                 let what = format!("element {} of section {:?}", self.elements.ids[element], section.elset);
                 Err(self.lines.src.error(section.at, what, found, expected))
             };
+            // An element has one section, and the section fits its type.
             if region_of[element] != NONE {
                 let other = &self.draft.regions[region_of[element] as usize].name;
                 return fault(format!("a second section; the first is {other:?}"), "one section");
@@ -108,13 +112,10 @@ impl Deck<'_> {
             match (card.class, section.beam.is_some()) {
                 (Class::Solid(_), false) => {}
                 (Class::Beam(of_card), true) if theory.is_none_or(|known| known == of_card) => theory = Some(of_card),
-                (Class::Beam(_), true) => {
-                    return fault("both B31 and B33".into(), "one of them per section");
-                }
+                (Class::Beam(_), true) => return fault("both B31 and B33".into(), "one of them per section"),
                 _ => {
                     let found = format!("{} with {}", card.type_name, section.title);
-                    let expected = "solids with *SOLID SECTION, beams with *BEAM SECTION";
-                    return fault(found, expected);
+                    return fault(found, "solids with *SOLID SECTION, beams with *BEAM SECTION");
                 }
             }
             region_of[element] = self.draft.regions.len() as u32;
@@ -158,7 +159,7 @@ impl Deck<'_> {
                 let known = listed(with_beams.iter().map(|k| &self.draft.regions[*k].name));
                 let element = format!("beam group {name:?}");
                 let expected = format!("a set of beam elements: {known}");
-                return Err(unknown(&self.lines.src, element, "no such set".into(), expected));
+                return Err(self.lines.src.error_in_file(element, "no such set", expected));
             };
             self.draft.regions[region].beam = Some(beam.clone());
         }
@@ -243,6 +244,7 @@ impl Deck<'_> {
         Ok(())
     }
 
+    /// Nodes of a surface: those of its node sets and nodes, or of the faces of its elements.
     fn surface_nodes(
         &self,
         surface: &Surface,
@@ -256,8 +258,9 @@ impl Deck<'_> {
         let mut out = Vec::new();
         for (at, member, face) in &surface.items {
             let what = || format!("surface {:?}", surface.name);
-            let number = parse_u64(member.as_bytes());
+            let number = unsigned(member.as_bytes());
             let missing = || src.error(*at, what(), member.as_str(), "a number or set of the file");
+            // An item is a number or the name of a set.
             if surface.of_nodes {
                 match number {
                     Some(id) => out.push(nodes.get(id).ok_or_else(missing)?),
@@ -277,6 +280,7 @@ impl Deck<'_> {
                 }
                 None => &elsets[self.elsets.find(&src, member, surface.scope, *at)?],
             };
+            // The same face of each element.
             budget.spend(&src, *at, &surface.name, 8 * members.len())?;
             for element in members {
                 let found = |text: &str| src.error(*at, what(), text, "a face S1 to S6 of a solid");

@@ -1,7 +1,11 @@
 //! Lines of a deck: cards `*NAME, KEY=VALUE, FLAG` and their data lines.
+//!
+//! Start at [`Lines::card`] and [`Lines::data`]. Names are compared in upper case without blanks
+//! ([`squeezed`]). Not here: the meaning of the cards ([`super::deck`]).
 
 use crate::FeFileError;
-use crate::mesh::source::{Source, parse_f64, parse_u64, shown};
+use crate::mesh::source::Source;
+use crate::number::{real, shown, unsigned};
 
 /// Lines that are neither blank nor comments.
 pub(super) struct Lines<'a> {
@@ -122,7 +126,7 @@ pub(super) fn fields(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 /// Parses all fields of a data line as numbers; an empty field is zero.
 pub(super) fn numbers(src: &Source, card: &Card, (at, line): Line) -> Result<Vec<f64>, FeFileError> {
     let number = |field: &[u8]| {
-        let value = if field.is_empty() { Some(0.0) } else { parse_f64(field) };
+        let value = if field.is_empty() { Some(0.0) } else { std::str::from_utf8(field).ok().and_then(real) };
         match value {
             Some(value) if value.is_finite() => Ok(value),
             Some(_) => Err(src.error(at, card.title.as_str(), shown(field), "a finite number")),
@@ -134,7 +138,7 @@ pub(super) fn numbers(src: &Source, card: &Card, (at, line): Line) -> Result<Vec
 
 /// Parses a field as the number of a node or an element.
 pub(super) fn id(src: &Source, at: usize, what: &str, field: &[u8]) -> Result<u64, FeFileError> {
-    parse_u64(field).ok_or_else(|| src.error(at, what, shown(field), "a number without sign or point"))
+    unsigned(field).ok_or_else(|| src.error(at, what, shown(field), "a number without sign or point"))
 }
 
 /// Converts to upper case and removes blanks.

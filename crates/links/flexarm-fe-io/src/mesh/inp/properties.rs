@@ -1,4 +1,7 @@
 //! Materials and sections of a deck, converted to SI.
+//!
+//! Start at [`MaterialCard`] and [`SectionCard`]. Dimensions are those of Abaqus; where CalculiX
+//! differs, a warning says so. Not here: elements of a section ([`super::finish`]).
 
 use std::collections::HashMap;
 

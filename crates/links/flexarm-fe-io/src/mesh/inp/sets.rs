@@ -1,11 +1,16 @@
 //! Named sets of nodes or elements, including nested sets.
+//!
+//! Start at [`Sets::add_line`], which keeps numbers and names as they are, and [`Sets::resolve`],
+//! which computes the members by index. Not here: nodes of element sets and surfaces
+//! ([`super::finish`]).
 
 use std::collections::HashMap;
 
 use super::lines::{Line, fields, squeezed, unquoted};
 use crate::FeFileError;
 use crate::mesh::ids::IdIndex;
-use crate::mesh::source::{Source, parse_u64, shown};
+use crate::mesh::source::Source;
+use crate::number::{shown, unsigned};
 use flexarm_fem::spelling::listed;
 
 /// Limit for the growth of sets by nesting and generation, proportional to the size of the file, so
@@ -107,7 +112,7 @@ impl Sets {
         take_ids: bool,
     ) -> Result<(), FeFileError> {
         if generate {
-            let values: Option<Vec<u64>> = fields(line).map(parse_u64).collect();
+            let values: Option<Vec<u64>> = fields(line).map(unsigned).collect();
             let range = match values.as_deref() {
                 Some([first, last]) => [*first, *last, 1],
                 Some([first, last, step]) if *step > 0 => [*first, *last, *step],
@@ -122,7 +127,7 @@ impl Sets {
         for field in fields(line).filter(|field| !field.is_empty()) {
             // `Part-1-1.17` is node 17 of the only instance.
             let last = field.rsplit(|byte| *byte == b'.').next().unwrap_or(field);
-            match (parse_u64(field), parse_u64(last)) {
+            match (unsigned(field), unsigned(last)) {
                 (Some(id), _) => {
                     self.list[set].ids.extend(take_ids.then_some(id));
                     continue;
@@ -201,9 +206,4 @@ fn tidy(members: &mut Vec<u32>, before: usize) {
         members.sort_unstable();
         members.dedup();
     }
-}
-
-/// Creates an error for an unknown name, without a position in the file.
-pub(super) fn unknown(src: &Source, element: String, found: String, known: String) -> FeFileError {
-    src.error_in_file(element, found, known)
 }

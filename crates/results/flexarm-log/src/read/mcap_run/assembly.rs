@@ -1,4 +1,8 @@
 //! Assembles samples from the messages of their topics.
+//!
+//! Start at [`Assembly::take`]. Messages of one sample have the same sequence number, except those
+//! of frames, which have the same log time. Files of older versions are read too. Not here: records
+//! ([`super::walk`]), poses in the world ([`super::frames`]).
 
 use std::collections::HashMap;
 
@@ -98,7 +102,8 @@ pub(super) struct Assembly {
     /// Log time of the current sample (ns).
     log_time: u64,
     sample: Sample,
-    seen: Vec<Topic>,
+    /// Topics of the current sample so far.
+    topics: Vec<Topic>,
     /// The last sample completed by [`Assembly::take`] or [`Assembly::close`], and its topics in
     /// order.
     pub(super) done: Sample,
@@ -144,7 +149,7 @@ impl Assembly {
             sequence: None,
             log_time: 0,
             sample: Sample { elastic, ..Sample::default() },
-            seen: Vec::new(),
+            topics: Vec::new(),
             done: Sample::default(),
             done_topics: Vec::new(),
             events: Vec::new(),
@@ -187,7 +192,7 @@ impl Assembly {
                     return Err(UnreadableMessage { topic, log_time_ns: header.log_time });
                 }
                 if topic.is_of_a_sample() {
-                    self.seen.push(topic);
+                    self.topics.push(topic);
                 }
                 Ok(closed)
             }
@@ -197,14 +202,14 @@ impl Assembly {
 
     /// Completes the current sample; returns whether there was one.
     pub(super) fn close(&mut self) -> bool {
-        if self.seen.is_empty() {
+        if self.topics.is_empty() {
             return false;
         }
         self.frames.poses(&mut self.sample);
         self.done.clone_from(&self.sample);
-        self.seen.sort_unstable();
-        self.done_topics.clone_from(&self.seen);
-        self.seen.clear();
+        self.topics.sort_unstable();
+        self.done_topics.clone_from(&self.topics);
+        self.topics.clear();
         true
     }
 

@@ -1,4 +1,7 @@
 //! Data stored once in an MCAP file: names, set-up, attached files, result.
+//!
+//! Start at [`FileContents::take`], which gets every record, and [`FileContents::header`].
+//! Not here: samples ([`super::assembly`]), the text of the header ([`crate::run_json`]).
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -95,21 +98,21 @@ impl FileContents {
             return if self.samples == 0 { Err(cut(broken)) } else { Ok(self.plain_header(path)) };
         };
         let damaged = |what: String| not_a_recording(path, what, "the description of a run");
-        let (mut header, run) = run_json::read(run).map_err(|error| damaged(error.to_string()))?;
+        let (mut header, attached, mesh_list) = run_json::read(run).map_err(|error| damaged(error.to_string()))?;
         let mut missing = Vec::new();
         header.urdf = String::from_utf8_lossy(self.urdf.as_deref().unwrap_or_default()).into_owned();
         match &self.mesh_block {
             Some(block) => {
                 let what = |error| damaged(format!("{}: {error}", meshes::FILE));
-                header.meshes = meshes::read(block, &run.meshes).map_err(what)?;
+                header.meshes = meshes::read(block, &mesh_list).map_err(what)?;
             }
-            None if run.meshes.is_empty() => {}
+            None if mesh_list.is_empty() => {}
             None => missing.push("the file breaks off before the surfaces of the links".to_owned()),
         }
         // Mesh files stay attached; their triangles are in the mesh block.
-        let mesh_file = |file: &Attachment| file.name.starts_with("meshes/") && !run.attachments.contains(&file.name);
+        let mesh_file = |file: &Attachment| file.name.starts_with("meshes/") && !attached.contains(&file.name);
         let mesh_files = self.files.iter().take_while(|file| mesh_file(file)).count();
-        let count = (mesh_files + run.attachments.len()).min(self.files.len());
+        let count = (mesh_files + attached.len()).min(self.files.len());
         header.attachments = self.files[..count].to_vec();
         Ok((header, count, missing))
     }

@@ -1,4 +1,5 @@
-//! Poses of links in the world, from the transforms of an MCAP file.
+//! Poses of links in the world, from the transforms of an MCAP file. Frames: W world, P parent
+//! link, L link, S station along a bent link.
 
 use std::collections::HashMap;
 
@@ -24,7 +25,7 @@ pub(super) struct Frames {
     X_PL: [Vec<Pose>; 2],
     X_LS: Vec<(usize, Pose)>,
     has_rigid: bool,
-    pub(super) stations_seen: bool,
+    pub(super) has_stations: bool,
 }
 
 #[derive(Clone, Copy)]
@@ -57,7 +58,7 @@ impl Frames {
             X_PL: [identities.clone(), identities],
             X_LS,
             has_rigid: header.has_rigid,
-            stations_seen: false,
+            has_stations: false,
         }
     }
 
@@ -68,7 +69,7 @@ impl Frames {
                 Some(&FrameOwner::Link { twin, link }) => self.X_PL[twin][link] = X,
                 Some(&FrameOwner::Station(k)) => {
                     self.X_LS[k].1 = X;
-                    self.stations_seen = true;
+                    self.has_stations = true;
                 }
                 None => {} // of another tree, for display only
             }

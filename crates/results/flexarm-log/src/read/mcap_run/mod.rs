@@ -1,9 +1,9 @@
 //! Reader of the MCAP file of a run, record by record: the memory in use does not depend on the
 //! length of the run, and a truncated file is read up to its last whole chunk.
 //!
-//! [`walk`] iterates over the records, [`found`] keeps data stored once, [`assembly`] assembles
-//! samples from messages, and [`frames`] computes poses in the world from transforms between
-//! neighbours.
+//! Start at [`McapRun`]. [`walk`] iterates over the records, [`found`] keeps data stored once,
+//! [`assembly`] assembles samples from messages, and [`frames`] computes poses in the world from
+//! transforms between neighbours. Not here: other formats ([`crate::read`]).
 
 mod assembly;
 mod found;
@@ -35,6 +35,7 @@ pub(crate) struct McapRun {
 
 impl McapRun {
     pub(crate) fn open(path: &Path) -> Result<Self, LogError> {
+        // Names and set-up, up to the second sample.
         let mut found = FileContents::default();
         let broken = walk(path, &mut |record| {
             found.take(record);
@@ -58,6 +59,7 @@ impl McapRun {
             assembly.close();
             topics.clone_from(&assembly.done_topics); // the only sample, or none
         }
+        // The header must not promise what the samples lack.
         if !header.contributors.is_empty() && !topics.is_empty() && !topics.contains(&Topic::Contributions) {
             header.contributors.clear();
             missing.push("the file has no shares of the tool error (/tcp/contributions)".into());
@@ -70,7 +72,7 @@ impl McapRun {
             header.has_static = false;
             missing.push("the file has no static part of the tool error (/tcp/static_error)".into());
         }
-        if !header.bends.is_empty() && !topics.is_empty() && !assembly.frames.stations_seen {
+        if !header.bends.is_empty() && !topics.is_empty() && !assembly.frames.has_stations {
             header.bends.clear();
             missing.push("the file has no frames of stations along bent links".into());
         }

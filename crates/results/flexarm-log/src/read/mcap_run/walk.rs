@@ -1,4 +1,8 @@
 //! Iterates over the records of an MCAP file, up to its end or the point of damage.
+//!
+//! Start at [`walk`]. The `mcap` crate reads the records; sizes that the file states are checked
+//! before, and its panics on damaged files are caught ([`crate::read::wall`]).
+//! Not here: the meaning of records ([`super::found`], [`super::assembly`]).
 
 use std::fs::File;
 use std::io::Read;

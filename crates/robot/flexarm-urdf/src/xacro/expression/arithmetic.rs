@@ -1,10 +1,13 @@
 //! Operators on values, with Python's rules for signs, integers and strings.
+//!
+//! Start at [`unary`], [`binary`] and [`compare`]. Integers remain integers, except under `/`; one
+//! with a float gives a float. Not here: evaluation of the operands ([`super::evaluate`]).
 
 use std::cmp::Ordering;
 use std::rc::Rc;
 
 use super::value::{Value, lookup};
-use super::{ExpressionError, methods};
+use super::{Charge, ExpressionError, methods};
 
 fn not_defined(sign: &str, left: &Value, right: &Value) -> ExpressionError {
     let trouble = ExpressionError::new(format!("{sign} is not defined between {} and {}", left.kind(), right.kind()));
@@ -43,8 +46,9 @@ pub(super) fn binary(
     sign: &str,
     left: &Value,
     right: &Value,
-    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+    charge: &mut Charge<'_>,
 ) -> Result<Value, ExpressionError> {
+    // Texts and sequences: concatenation, repetition, formatting.
     match (sign, left, right) {
         ("+", Value::Str(a), Value::Str(b)) => {
             charge(a.len() + b.len())?;
@@ -71,6 +75,7 @@ pub(super) fn binary(
         ("%", Value::Str(format), _) => return methods::percent(format, right),
         _ => {}
     }
+    // Numbers.
     if let (Some(a), Some(b)) = (left.as_int(), right.as_int()) {
         return whole(sign, a, b);
     }
@@ -80,11 +85,7 @@ pub(super) fn binary(
     }
 }
 
-fn repeat(
-    value: &Value,
-    times: i128,
-    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
-) -> Result<Value, ExpressionError> {
+fn repeat(value: &Value, times: i128, charge: &mut Charge<'_>) -> Result<Value, ExpressionError> {
     let times = usize::try_from(times.max(0)).unwrap_or(usize::MAX);
     charge(value.size().saturating_mul(times))?;
     let copies = |items: &[Value]| std::iter::repeat_n(items, times).flatten().cloned().collect::<Vec<_>>();

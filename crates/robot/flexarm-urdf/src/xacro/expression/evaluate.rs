@@ -1,6 +1,13 @@
 //! Evaluation of an expression tree.
+//!
+//! Start at [`Interpreter::evaluate`]. Work and depth are charged before each step, so that an
+//! expression from an untrusted file ends.
+//! Not here: operators ([`super::arithmetic`]), functions ([`super::functions`]), methods and
+//! indices ([`super::methods`]).
 
 use std::rc::Rc;
+
+use flexarm_settings::closest;
 
 use super::super::scope::Table;
 use super::arithmetic::{binary, compare, unary};
@@ -9,7 +16,7 @@ use super::methods::{elements, index, slice, unique};
 use super::parse::{Clause, Expr};
 use super::value::{Value, lookup};
 use super::{ExpressionError, Interpreter, Scope};
-use flexarm_settings::closest;
+use crate::report::did_you_mean;
 
 impl Interpreter<'_> {
     pub(super) fn evaluate(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, ExpressionError> {
@@ -22,7 +29,8 @@ impl Interpreter<'_> {
 
     fn evaluate_here(&mut self, tree: &Expr, scope: &Scope) -> Result<Value, ExpressionError> {
         Ok(match tree {
-            Expr::Const(constant) => constant.value(),
+            Expr::Const(constant) => constant.clone(),
+            // Names and containers.
             Expr::Name(name) => return self.name(name, scope),
             Expr::List(items) => Value::list(self.all(items, scope)?),
             Expr::Tuple(items) => Value::Tuple(Rc::new(self.all(items, scope)?)),
@@ -33,6 +41,7 @@ impl Interpreter<'_> {
                 }
                 Value::Dict(Rc::new(unique(pairs)))
             }
+            // Operators.
             Expr::Unary(sign, operand) => return unary(sign, &self.evaluate(operand, scope)?),
             Expr::Binary(sign, left, right) => return self.operation(sign, left, right, scope),
             Expr::Compare(first, rest) => Value::Bool(self.comparison(first, rest, scope)?),
@@ -42,6 +51,7 @@ impl Interpreter<'_> {
                 let branch = if self.evaluate(condition, scope)?.is_true() { then } else { otherwise };
                 return self.evaluate(branch, scope);
             }
+            // Calls and parts of a value.
             Expr::Call { function, arguments, named } => return self.call_tree(function, arguments, named, scope),
             Expr::Attribute(owner, name) => {
                 let owner = self.evaluate(owner, scope)?;
@@ -147,12 +157,9 @@ impl Interpreter<'_> {
             return Ok(value);
         }
         named_value(name).ok_or_else(|| {
-            let known = scope.names();
-            let trouble = ExpressionError::new(format!("the name {name:?} is not defined"));
-            match closest(name, known.iter().map(String::as_str)) {
-                Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
-                None => trouble.help("define it with <xacro:property> before it is used, or put quotes around a text"),
-            }
+            let meant = closest(name, scope.names().iter().map(String::as_str));
+            let otherwise = "define it with <xacro:property> before it is used, or put quotes around a text";
+            ExpressionError::new(format!("the name {name:?} is not defined")).help(did_you_mean(meant, otherwise))
         })
     }
 
@@ -186,6 +193,7 @@ impl Interpreter<'_> {
             },
             _ => None,
         };
+        // Function and arguments, in the order of Python.
         let callee = if method.is_none() { Some(self.evaluate(function, scope)?) } else { None };
         let arguments = self.all(arguments, scope)?;
         let mut by_name = Vec::new();
@@ -196,7 +204,7 @@ impl Interpreter<'_> {
             self.charge_whole(argument)?;
         }
         let value = match (callee, method) {
-            (Some(Value::Function(name)), _) => self.call(name, &arguments, by_name, scope)?,
+            (Some(Value::Function(name)), _) => self.call(name, &arguments, by_name)?,
             (Some(other), _) => return Err(ExpressionError::new(format!("a {} cannot be called", other.kind()))),
             (None, Some((owner, name))) => {
                 self.charge_whole(&owner)?;
@@ -208,6 +216,8 @@ impl Interpreter<'_> {
         Ok(value)
     }
 
+    /// Appends the items of a comprehension to `found`: loops over the first clause, and calls
+    /// itself for the inner ones.
     fn comprehend(
         &mut self,
         item: &Expr,
@@ -223,6 +233,7 @@ impl Interpreter<'_> {
         };
         let items = self.evaluate(&clause.items, scope)?;
         for value in elements(&items)? {
+            // Assigns an element to the targets, which only this iteration can use.
             let local = Table::child(scope);
             match &clause.targets[..] {
                 [name] => local.define(name, value),
@@ -236,11 +247,12 @@ impl Interpreter<'_> {
                 }
             }
             self.charge(200)?;
-            let mut kept = true;
+            // Conditions after a false one are not evaluated.
+            let mut is_kept = true;
             for condition in &clause.conditions {
-                kept = kept && self.evaluate(condition, &local)?.is_true();
+                is_kept = is_kept && self.evaluate(condition, &local)?.is_true();
             }
-            if kept {
+            if is_kept {
                 self.comprehend(item, inner, &local, found)?;
             }
         }
@@ -250,9 +262,7 @@ impl Interpreter<'_> {
 
 fn missing_key(items: &[(Value, Value)], name: &str) -> ExpressionError {
     let keys: Vec<String> = items.iter().map(|(k, _)| k.shown()).collect();
-    let trouble = ExpressionError::new(format!("the dictionary has no key {name:?}"));
-    match closest(name, keys.iter().map(String::as_str)) {
-        Some(meant) => trouble.help(format!("did you mean {meant:?}?")),
-        None => trouble.help(format!("its keys are {}", super::shortened(&keys.join(", ")))),
-    }
+    let meant = closest(name, keys.iter().map(String::as_str));
+    let help = did_you_mean(meant, &format!("its keys are {}", super::shortened(&keys.join(", "))));
+    ExpressionError::new(format!("the dictionary has no key {name:?}")).help(help)
 }

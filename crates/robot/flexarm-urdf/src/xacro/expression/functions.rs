@@ -1,12 +1,19 @@
 //! Built-in names: constants, functions of `math`, and those of Python and xacro.
+//!
+//! Start at [`named_value`] and [`Interpreter::call`]. A call tries the functions in four groups:
+//! those with an effect on the interpreter, of real numbers, of single values, of sequences.
+//! Not here: methods of values ([`super::methods`]), operators ([`super::arithmetic`]).
 
+use std::cmp::Ordering;
 use std::f64::consts;
 use std::rc::Rc;
+
+use flexarm_settings::Severity;
 
 use super::arithmetic::{binary, floor_division};
 use super::methods::{elements, unique};
 use super::value::{Value, float_of, float_repr, int_of};
-use super::{ExpressionError, Interpreter, Scope};
+use super::{ExpressionError, Interpreter};
 
 /// Functions by their names without module.
 const FUNCTIONS: &str = "\
@@ -39,27 +46,29 @@ pub(crate) fn is_built_in(name: &str) -> bool {
 }
 
 impl Interpreter<'_> {
+    /// Calls a function of [`FUNCTIONS`] with its arguments by position and by name.
     pub(super) fn call(
         &mut self,
         name: &'static str,
         arguments: &[Value],
         named: Vec<(String, Value)>,
-        _scope: &Scope,
     ) -> Result<Value, ExpressionError> {
         let text = |i: usize| arguments.get(i).map(Value::shown).unwrap_or_default();
         let message = || arguments.iter().map(Value::shown).collect::<Vec<_>>().join(" ");
         match (name, arguments) {
+            // Functions of xacro.
             ("load_yaml", [_]) => return self.load_yaml(&text(0)),
             ("abs_filename", [_]) => return Ok(Value::text(self.beside(&text(0)).display().to_string())),
             ("arg", [_]) => return self.argument(&text(0)).map(Value::text),
             ("dotify", [dict]) => return Ok(dict.clone()),
-            ("message", _) => self.remark(flexarm_settings::Severity::Note, "xacro-message", message(), ""),
-            ("warning", _) => self.remark(flexarm_settings::Severity::Warning, "xacro-warning", message(), ""),
-            ("error", _) => self.remark(flexarm_settings::Severity::Warning, "xacro-error", message(), ""),
+            ("message", _) => self.remark(Severity::Note, "xacro-message", message(), ""),
+            ("warning", _) => self.remark(Severity::Warning, "xacro-warning", message(), ""),
+            ("error", _) => self.remark(Severity::Warning, "xacro-error", message(), ""),
             ("print_location", _) => {}
             ("fatal", _) => {
                 return Err(ExpressionError::new(message()).help("the file itself stops here: see what it requires"));
             }
+            // Functions that take names, or charge before they allocate.
             ("range", _) => return self.range(arguments),
             ("dict", _) => return dict(arguments, named),
             _ => {
@@ -116,6 +125,7 @@ fn plain(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
         ExpressionError::new(format!("{name}() does not take {} ({})", arguments.len(), kinds.join(", ")))
     };
     Ok(match (name, arguments) {
+        // Rounding and tests of numbers.
         ("floor", [x]) => rounded(x, f64::floor).ok_or_else(wrong)?,
         ("ceil", [x]) => rounded(x, f64::ceil).ok_or_else(wrong)?,
         ("trunc", [x]) => rounded(x, f64::trunc).ok_or_else(wrong)?,
@@ -126,11 +136,13 @@ fn plain(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
             let (a, b) = (a.as_float().ok_or_else(wrong)?, b.as_float().ok_or_else(wrong)?);
             Value::Bool(a == b || (a - b).abs() <= 1e-9 * a.abs().max(b.abs()))
         }
+        // Arithmetic of integers.
         ("gcd", [a, b]) => Value::Int(gcd(a.as_int().ok_or_else(wrong)?, b.as_int().ok_or_else(wrong)?)),
         ("abs", [Value::Float(x)]) => Value::Float(x.abs()),
         ("abs", [x]) => Value::Int(x.as_int().and_then(i128::checked_abs).ok_or_else(wrong)?),
         ("round", [x]) => rounded(x, f64::round_ties_even).ok_or_else(wrong)?,
         ("round", [x, digits]) => round_to(x, digits).ok_or_else(wrong)?,
+        // Conversions.
         ("int", []) => Value::Int(0),
         ("int", [Value::Str(text)]) => Value::Int(int_of(text).ok_or_else(|| not_number("whole number", text))?),
         ("int", [x]) => rounded(x, f64::trunc).ok_or_else(wrong)?,
@@ -142,6 +154,7 @@ fn plain(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
         ("repr", [value]) => Value::text(value.repr()),
         ("bool", []) => Value::Bool(false),
         ("bool", [value]) => Value::Bool(value.is_true()),
+        // Lengths, types and characters.
         ("len", [Value::Str(text)]) => Value::Int(text.chars().count() as i128),
         ("len", [value]) => Value::Int(elements(value)?.len() as i128),
         ("type", [value]) => Value::text(format!("<class '{}'>", value.kind())),
@@ -181,7 +194,7 @@ fn divmod(a: &Value, b: &Value) -> Result<Option<[Value; 2]>, ExpressionError> {
 /// Functions of sequences; `None` if there is no such function.
 fn of_elements(name: &str, arguments: &[Value]) -> Option<Result<Value, ExpressionError>> {
     let value = match (name, arguments) {
-        ("min" | "max", arguments) => extreme(name, arguments),
+        // Containers.
         ("list", []) => Ok(Value::list(Vec::new())),
         ("tuple", []) => Ok(Value::Tuple(Rc::new(Vec::new()))),
         ("list", [items]) => elements(items).map(Value::list),
@@ -190,13 +203,16 @@ fn of_elements(name: &str, arguments: &[Value]) -> Option<Result<Value, Expressi
             let unit = items.into_iter().map(|item| (item, Value::None)).collect();
             Value::list(unique(unit).into_iter().map(|(item, _)| item).collect())
         }),
-        ("reversed", [items]) => elements(items).map(|items| Value::list(items.into_iter().rev().collect())),
+        // Reductions.
+        ("min" | "max", arguments) => extreme(name, arguments),
         ("all", [items]) => elements(items).map(|items| Value::Bool(items.iter().all(Value::is_true))),
         ("any", [items]) => elements(items).map(|items| Value::Bool(items.iter().any(Value::is_true))),
         ("sum" | "fsum", [items]) => elements(items).and_then(|items| {
             let add = |sum: Value, item: &Value| binary("+", &sum, item, &mut |_| Ok(()));
             items.iter().try_fold(Value::Int(0), add)
         }),
+        // Other lists of the same elements.
+        ("reversed", [items]) => elements(items).map(|items| Value::list(items.into_iter().rev().collect())),
         ("sorted", [items]) => elements(items).and_then(sorted),
         ("enumerate", [items]) => elements(items).map(|items| {
             let pair = |(i, item)| Value::Tuple(Rc::new(vec![Value::Int(i as i128), item]));
@@ -220,13 +236,13 @@ fn sorted(mut items: Vec<Value>) -> Result<Value, ExpressionError> {
     if let Some(pair) = items.windows(2).find(|pair| pair[0].order(&pair[1]).is_none()) {
         return Err(ExpressionError::new(format!("{} and {} have no order", pair[0].repr(), pair[1].repr())));
     }
-    items.sort_by(|a, b| a.order(b).unwrap_or(std::cmp::Ordering::Equal));
+    items.sort_by(|a, b| a.order(b).unwrap_or(Ordering::Equal));
     Ok(Value::list(items))
 }
 
 fn extreme(name: &str, arguments: &[Value]) -> Result<Value, ExpressionError> {
     let items = if let [items] = arguments { elements(items)? } else { arguments.to_vec() };
-    let wanted = if name == "min" { std::cmp::Ordering::Less } else { std::cmp::Ordering::Greater };
+    let wanted = if name == "min" { Ordering::Less } else { Ordering::Greater };
     let mut items = items.into_iter();
     let mut best = items.next().ok_or_else(|| ExpressionError::new(format!("{name}() of nothing")))?;
     for item in items {
@@ -273,6 +289,7 @@ fn round_to(x: &Value, digits: &Value) -> Option<Value> {
 /// Functions of real numbers; `None` if there is no such function with this number of arguments.
 fn of_numbers(name: &str, arguments: &[f64]) -> Option<Result<f64, ExpressionError>> {
     let value = match (name, arguments) {
+        // Angles in rad.
         ("sin", [x]) => x.sin(),
         ("cos", [x]) => x.cos(),
         ("tan", [x]) => x.tan(),
@@ -283,6 +300,7 @@ fn of_numbers(name: &str, arguments: &[f64]) -> Option<Result<f64, ExpressionErr
         ("sinh", [x]) => x.sinh(),
         ("cosh", [x]) => x.cosh(),
         ("tanh", [x]) => x.tanh(),
+        // Roots, exponentials and logarithms; a logarithm outside its domain is undefined.
         ("sqrt", [x]) => x.sqrt(),
         ("cbrt", [x]) => x.cbrt(),
         ("exp", [x]) => x.exp(),
@@ -291,6 +309,7 @@ fn of_numbers(name: &str, arguments: &[f64]) -> Option<Result<f64, ExpressionErr
         ("log10", [x]) if *x > 0.0 => x.log10(),
         ("log2", [x]) if *x > 0.0 => x.log2(),
         ("log", [_] | [_, _]) | ("log10" | "log2", [_]) => f64::NAN,
+        // Other.
         ("fabs", [x]) => x.abs(),
         ("hypot", numbers) => numbers.iter().fold(0.0f64, |h, x| h.hypot(*x)),
         ("pow", [x, y]) => x.powf(*y),

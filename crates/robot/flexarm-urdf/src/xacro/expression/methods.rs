@@ -1,9 +1,12 @@
 //! Methods of strings, lists and dictionaries, indexing, and the two ways of formatting.
+//!
+//! Start at [`call`], [`index`], [`slice`] and [`formatted`]. Positions count characters, as in
+//! Python. Not here: functions ([`super::functions`]), operators ([`super::arithmetic`]).
 
 use std::rc::Rc;
 
-use super::ExpressionError;
 use super::value::{Value, float_repr, lookup};
+use super::{Charge, ExpressionError};
 
 /// `value[key]`
 pub(super) fn index(owner: &Value, key: &Value) -> Result<Value, ExpressionError> {
@@ -36,6 +39,7 @@ pub(super) fn slice(owner: &Value, [start, end, step]: [Option<i128>; 3]) -> Res
     if step == 0 {
         return Err(ExpressionError::new("the step of a slice is 0"));
     }
+    // Negative bounds count from the end, and bounds beyond the ends are moved to them.
     let picked = |length: usize| -> Vec<usize> {
         let n = length as i128;
         let (low, high) = if step > 0 { (0, n) } else { (-1, n - 1) };
@@ -70,8 +74,9 @@ pub(super) fn call(
     name: &str,
     arguments: &[Value],
     named: &[(String, Value)],
-    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+    charge: &mut Charge<'_>,
 ) -> Result<Value, ExpressionError> {
+    // `None` stands for a method that the type does not have, or not with so many arguments.
     let method = match owner {
         Value::Str(text) if name == "format" => return format(text, arguments, named, charge).map(Value::text),
         Value::Str(text) => of_text(text, name, arguments, charge)?,
@@ -102,16 +107,18 @@ pub(super) fn call(
     })
 }
 
+/// Method of a text; `None` if there is no such one with these arguments.
 fn of_text(
     text: &str,
     name: &str,
     arguments: &[Value],
-    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+    charge: &mut Charge<'_>,
 ) -> Result<Option<Value>, ExpressionError> {
     let texts: Vec<&str> = arguments.iter().map_while(Value::as_str).collect();
     let all_texts = texts.len() == arguments.len();
     let set = |chars: &str| chars.chars().collect::<Vec<char>>();
     Ok(Some(match (name, &texts[..]) {
+        // Methods with arguments other than texts.
         ("join", []) if arguments.len() == 1 => joined(text, &arguments[0], charge)?,
         ("split", [separator]) if arguments.len() == 2 && !separator.is_empty() => {
             let most =
@@ -124,14 +131,18 @@ fn of_text(
             Value::text(format!("{text:0>width$}"))
         }
         _ if !all_texts => return Ok(None),
+        // Letters and white space.
         ("lower", []) => Value::text(text.to_lowercase()),
         ("upper", []) => Value::text(text.to_uppercase()),
+        ("capitalize", []) => Value::text(capitalized(text)),
+        ("title", []) => Value::text(title(text)),
         ("strip", []) => Value::text(text.trim()),
         ("lstrip", []) => Value::text(text.trim_start()),
         ("rstrip", []) => Value::text(text.trim_end()),
         ("strip", [chars]) => Value::text(text.trim_matches(&set(chars)[..])),
         ("lstrip", [chars]) => Value::text(text.trim_start_matches(&set(chars)[..])),
         ("rstrip", [chars]) => Value::text(text.trim_end_matches(&set(chars)[..])),
+        // Parts of the text.
         ("split", []) => Value::list(text.split_whitespace().map(Value::text).collect()),
         ("split", [separator]) if !separator.is_empty() => {
             Value::list(text.split(separator).map(Value::text).collect())
@@ -144,25 +155,20 @@ fn of_text(
             charge(text.matches(from).count().saturating_mul(to.len()).saturating_add(text.len()))?;
             Value::text(text.replace(from, to))
         }
+        // Searches and tests.
         ("startswith", [part]) => Value::Bool(text.starts_with(part)),
         ("endswith", [part]) => Value::Bool(text.ends_with(part)),
         ("removeprefix", [part]) => Value::text(text.strip_prefix(part).unwrap_or(text)),
         ("removesuffix", [part]) => Value::text(text.strip_suffix(part).unwrap_or(text)),
         ("find", [part]) => Value::Int(text.find(part).map_or(-1, |at| text[..at].chars().count() as i128)),
         ("count", [part]) if !part.is_empty() => Value::Int(text.matches(part).count() as i128),
-        ("capitalize", []) => Value::text(capitalized(text)),
-        ("title", []) => Value::text(title(text)),
         ("isdigit" | "isnumeric", []) => Value::Bool(!text.is_empty() && text.chars().all(char::is_numeric)),
         ("isalpha", []) => Value::Bool(!text.is_empty() && text.chars().all(char::is_alphabetic)),
         _ => return Ok(None),
     }))
 }
 
-fn joined(
-    separator: &str,
-    list: &Value,
-    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
-) -> Result<Value, ExpressionError> {
+fn joined(separator: &str, list: &Value, charge: &mut Charge<'_>) -> Result<Value, ExpressionError> {
     let parts = elements(list)?;
     let parts: Option<Vec<&str>> = parts.iter().map(Value::as_str).collect();
     let parts = parts.ok_or_else(|| ExpressionError::new("join() takes texts"))?;
@@ -196,7 +202,7 @@ fn format(
     text: &str,
     arguments: &[Value],
     named: &[(String, Value)],
-    charge: &mut dyn FnMut(usize) -> Result<(), ExpressionError>,
+    charge: &mut Charge<'_>,
 ) -> Result<String, ExpressionError> {
     let mut out = String::new();
     let (mut rest, mut next) = (text, 0);
@@ -266,6 +272,7 @@ fn formatted(value: &Value, spec: &str) -> Result<String, ExpressionError> {
     if spec.is_empty() {
         return Ok(value.shown());
     }
+    // Alignment, width, precision, kind.
     let (align, body) = match spec.strip_prefix(['<', '>', '-']) {
         Some(body) => (&spec[..1], body),
         None => ("", spec),
@@ -277,6 +284,7 @@ fn formatted(value: &Value, spec: &str) -> Result<String, ExpressionError> {
     let precision = precision.map(|p| small(p).ok_or_else(bad)).transpose()?;
     let zeros = width.starts_with('0');
     let width = if width.is_empty() { 0 } else { small(width).ok_or_else(bad)? };
+    // The value in its kind, without padding.
     let text = match (kind, value) {
         (Some('d'), value) => match (value.as_int(), value) {
             (Some(i), _) => i.to_string(),
@@ -300,6 +308,7 @@ fn formatted(value: &Value, spec: &str) -> Result<String, ExpressionError> {
         (Some('r'), value) => value.repr(),
         _ => return Err(bad()),
     };
+    // Numbers are aligned to the right, or padded by zeros after the sign; texts to the left.
     let number = value.as_float().is_some() && kind != Some('s');
     Ok(match (align, number) {
         (_, true) if zeros => match text.strip_prefix('-') {

@@ -45,6 +45,9 @@ impl ExpressionError {
     }
 }
 
+/// Charges memory before it is allocated, and fails at the limit of a document.
+type Charge<'c> = dyn FnMut(usize) -> Result<(), ExpressionError> + 'c;
+
 impl Interpreter<'_> {
     /// Evaluates the text of an expression.
     pub(crate) fn expression(&mut self, text: &str, scope: &Scope) -> Result<Value, ExpressionError> {

@@ -1,17 +1,21 @@
 //! Parser from tokens to a tree by precedence, with Python's rules.
+//!
+//! Start at [`parse`]. Each method of [`Parser`] parses one rule of the grammar and calls the rule
+//! that binds more strongly: condition, `or`, `and`, `not`, comparison, binary operators by
+//! [`power`], sign, power, call or index, atom.
+//! Not here: splitting the text ([`super::token`]), values of names ([`super::evaluate`]).
 
 use super::ExpressionError;
 use super::token::{Token, tokens};
 use super::value::Value;
 
-/// Maximum nesting depth of brackets, signs and conditions.
+/// Maximum nesting depth of brackets, signs and conditions, which bounds the stack.
 const MAX_NESTED: usize = 60;
 /// Maximum number of tokens in an expression.
 const MAX_TOKENS: usize = 4000;
 
-#[derive(Debug)]
 pub(super) enum Expr {
-    Const(Constant),
+    Const(Value),
     Name(String),
     List(Vec<Expr>),
     Tuple(Vec<Expr>),
@@ -41,30 +45,7 @@ pub(super) enum Expr {
     },
 }
 
-/// A number, a string or one of the three constants.
-#[derive(Debug)]
-pub(super) enum Constant {
-    None,
-    Bool(bool),
-    Int(i128),
-    Float(f64),
-    Text(String),
-}
-
-impl Constant {
-    pub(super) fn value(&self) -> Value {
-        match self {
-            Self::None => Value::None,
-            Self::Bool(b) => Value::Bool(*b),
-            Self::Int(i) => Value::Int(*i),
-            Self::Float(x) => Value::Float(*x),
-            Self::Text(s) => Value::text(s),
-        }
-    }
-}
-
 /// `for a, b in items if condition`
-#[derive(Debug)]
 pub(super) struct Clause {
     pub(super) targets: Vec<String>,
     pub(super) items: Expr,
@@ -182,6 +163,15 @@ impl Parser {
         }
     }
 
+    /// Enters one nesting level; the caller leaves it.
+    fn nest(&mut self) -> Result<(), ExpressionError> {
+        self.nested += 1;
+        if self.nested > MAX_NESTED {
+            return Err(ExpressionError::new(format!("the expression is nested more than {MAX_NESTED} deep")));
+        }
+        Ok(())
+    }
+
     /// Parses `a` or `a, b`: a tuple needs no brackets.
     fn list_or_one(&mut self) -> Result<Expr, ExpressionError> {
         let first = self.expression()?;
@@ -200,40 +190,41 @@ impl Parser {
 
     /// Parses `a if b else c`.
     fn expression(&mut self) -> Result<Expr, ExpressionError> {
-        self.nested += 1;
-        if self.nested > MAX_NESTED {
-            return Err(ExpressionError::new(format!("the expression is nested more than {MAX_NESTED} deep")));
-        }
-        let then = self.disjunction()?;
-        let tree = if self.take_word("if") {
+        self.nest()?;
+        let mut tree = self.disjunction()?;
+        if self.take_word("if") {
             let condition = Box::new(self.disjunction()?);
             if !self.take_word("else") {
                 let found = unexpected(self.peek());
                 return Err(ExpressionError::new(format!("{}; expected else", found.message)));
             }
             let otherwise = Box::new(self.expression()?);
-            Expr::If { condition, then: Box::new(then), otherwise }
-        } else {
-            then
-        };
+            tree = Expr::If { condition, then: Box::new(tree), otherwise };
+        }
         self.nested -= 1;
         Ok(tree)
     }
 
     fn disjunction(&mut self) -> Result<Expr, ExpressionError> {
-        let mut terms = vec![self.conjunction()?];
-        while self.take_word("or") {
-            terms.push(self.conjunction()?);
-        }
-        Ok(if terms.len() == 1 { terms.remove(0) } else { Expr::Or(terms) })
+        self.terms("or", Self::conjunction, Expr::Or)
     }
 
     fn conjunction(&mut self) -> Result<Expr, ExpressionError> {
-        let mut terms = vec![self.negation()?];
-        while self.take_word("and") {
-            terms.push(self.negation()?);
+        self.terms("and", Self::negation, Expr::And)
+    }
+
+    /// Parses terms with a word between them; several are joined.
+    fn terms(
+        &mut self,
+        word: &str,
+        term: fn(&mut Self) -> Result<Expr, ExpressionError>,
+        join: fn(Vec<Expr>) -> Expr,
+    ) -> Result<Expr, ExpressionError> {
+        let mut terms = vec![term(self)?];
+        while self.take_word(word) {
+            terms.push(term(self)?);
         }
-        Ok(if terms.len() == 1 { terms.remove(0) } else { Expr::And(terms) })
+        Ok(if terms.len() == 1 { terms.remove(0) } else { join(terms) })
     }
 
     fn negation(&mut self) -> Result<Expr, ExpressionError> {
@@ -291,10 +282,7 @@ impl Parser {
     fn unary(&mut self) -> Result<Expr, ExpressionError> {
         for sign in ["-", "+", "~"] {
             if self.take_sign(sign) {
-                self.nested += 1;
-                if self.nested > MAX_NESTED {
-                    return Err(ExpressionError::new(format!("the expression is nested more than {MAX_NESTED} deep")));
-                }
+                self.nest()?;
                 let tree = Expr::Unary(sign, Box::new(self.unary()?));
                 self.nested -= 1;
                 return Ok(tree);
@@ -303,10 +291,7 @@ impl Parser {
         let base = self.primary()?;
         if self.take_sign("**") {
             // Right-associative; binds more strongly than a sign on its left, but not on its right.
-            self.nested += 1;
-            if self.nested > MAX_NESTED {
-                return Err(ExpressionError::new(format!("the expression is nested more than {MAX_NESTED} deep")));
-            }
+            self.nest()?;
             let exponent = self.unary()?;
             self.nested -= 1;
             return Ok(Expr::Binary("**", Box::new(base), Box::new(exponent)));
@@ -341,11 +326,7 @@ impl Parser {
                 named.push((name, self.expression()?));
             } else {
                 let item = self.expression()?;
-                if self.is_word("for") {
-                    arguments.push(Expr::Comprehension { item: Box::new(item), clauses: self.clauses()? });
-                } else {
-                    arguments.push(item);
-                }
+                arguments.push(self.comprehension(item)?);
             }
             if !self.is_sign(")") {
                 self.need_sign(",")?;
@@ -357,10 +338,7 @@ impl Parser {
     fn subscript(&mut self, tree: Expr) -> Result<Expr, ExpressionError> {
         let mut parts: [Option<Box<Expr>>; 3] = [None, None, None];
         let mut colons = 0;
-        loop {
-            if self.take_sign("]") {
-                break;
-            }
+        while !self.take_sign("]") {
             if self.take_sign(":") {
                 colons += 1;
                 if colons > 2 {
@@ -380,7 +358,8 @@ impl Parser {
         }
     }
 
-    fn clauses(&mut self) -> Result<Vec<Clause>, ExpressionError> {
+    /// Parses the `for` clauses after an item, if there are any.
+    fn comprehension(&mut self, item: Expr) -> Result<Expr, ExpressionError> {
         let mut clauses = Vec::new();
         while self.take_word("for") {
             let bracket = self.take_sign("(");
@@ -401,14 +380,14 @@ impl Parser {
             }
             clauses.push(Clause { targets, items, conditions });
         }
-        Ok(clauses)
+        Ok(if clauses.is_empty() { item } else { Expr::Comprehension { item: Box::new(item), clauses } })
     }
 
     fn atom(&mut self) -> Result<Expr, ExpressionError> {
         let Some(token) = self.peek().cloned() else { return Err(unexpected(None)) };
         match token {
-            Token::Int(i) => self.constant(Constant::Int(i)),
-            Token::Float(x) => self.constant(Constant::Float(x)),
+            Token::Int(i) => self.constant(Value::Int(i)),
+            Token::Float(x) => self.constant(Value::Float(x)),
             Token::Text(mut text) => {
                 self.at += 1;
                 // Adjacent strings are concatenated.
@@ -416,12 +395,12 @@ impl Parser {
                     text.push_str(more);
                     self.at += 1;
                 }
-                Ok(Expr::Const(Constant::Text(text)))
+                Ok(Expr::Const(Value::text(text)))
             }
             Token::Name(word) => match word.as_str() {
-                "None" => self.constant(Constant::None),
-                "True" => self.constant(Constant::Bool(true)),
-                "False" => self.constant(Constant::Bool(false)),
+                "None" => self.constant(Value::None),
+                "True" => self.constant(Value::Bool(true)),
+                "False" => self.constant(Value::Bool(false)),
                 _ => self.name().map(Expr::Name),
             },
             Token::Sign("(") => {
@@ -430,10 +409,7 @@ impl Parser {
                     return Ok(Expr::Tuple(Vec::new()));
                 }
                 let tree = self.list_or_one()?;
-                let tree = match self.is_word("for") {
-                    true => Expr::Comprehension { item: Box::new(tree), clauses: self.clauses()? },
-                    false => tree,
-                };
+                let tree = self.comprehension(tree)?;
                 self.need_sign(")")?;
                 Ok(tree)
             }
@@ -449,7 +425,7 @@ impl Parser {
         }
     }
 
-    fn constant(&mut self, constant: Constant) -> Result<Expr, ExpressionError> {
+    fn constant(&mut self, constant: Value) -> Result<Expr, ExpressionError> {
         self.at += 1;
         Ok(Expr::Const(constant))
     }
@@ -459,7 +435,7 @@ impl Parser {
         while !self.take_sign("]") {
             let item = self.expression()?;
             if items.is_empty() && self.is_word("for") {
-                let tree = Expr::Comprehension { item: Box::new(item), clauses: self.clauses()? };
+                let tree = self.comprehension(item)?;
                 self.need_sign("]")?;
                 return Ok(tree);
             }

@@ -1,4 +1,6 @@
-//! Splits the text of an expression into tokens.
+//! Splits the text of an expression into tokens: names, numbers, strings, signs.
+//!
+//! Start at [`tokens`]. Not here: their order and nesting ([`super::parse`]).
 
 use super::ExpressionError;
 
@@ -22,6 +24,7 @@ pub(super) fn tokens(text: &str) -> Result<Vec<Token>, ExpressionError> {
     let mut found = Vec::new();
     let mut rest = text.trim_start();
     while let Some(first) = rest.chars().next() {
+        // The first character decides the kind of the token.
         let (token, length) = if first.is_ascii_digit() || (first == '.' && digit_at(rest, 1)) {
             number(rest)?
         } else if first.is_alphabetic() || first == '_' {
@@ -68,6 +71,7 @@ fn number(text: &str) -> Result<(Token, usize), ExpressionError> {
         let value = i128::from_str_radix(&text[2..end].replace('_', ""), radix).map_err(|_| bad(end))?;
         return Ok((Token::Int(value), end));
     }
+    // Decimal: digits, point and digits, exponent; `_` may separate digits.
     let bytes = text.as_bytes();
     let run = |mut at: usize| {
         while bytes.get(at).is_some_and(|b| b.is_ascii_digit() || *b == b'_') {

@@ -1,4 +1,7 @@
 //! Values of expressions, with Python's printing, comparison and truth values.
+//!
+//! Start at [`Value`]; [`int_of`] and [`float_of`] parse text like Python's `int()` and `float()`.
+//! Not here: operators ([`super::arithmetic`]), scalars of YAML ([`super::super::yaml`]).
 
 use std::cmp::Ordering;
 use std::rc::Rc;
@@ -69,11 +72,11 @@ impl Value {
         }
     }
 
-    /// Integer value; a Boolean counts as one.
     pub(crate) fn as_str(&self) -> Option<&str> {
         if let Self::Str(text) = self { Some(text) } else { None }
     }
 
+    /// Integer value; a Boolean counts as 0 or 1.
     pub(crate) fn as_int(&self) -> Option<i128> {
         match self {
             Self::Bool(b) => Some(i128::from(*b)),
