@@ -46,7 +46,7 @@ pub struct LimitOptions {
 }
 
 impl LimitOptions {
-    /// Returns options for limits up to a depth, to 0.1 % or better.
+    /// Returns options for limits up to a depth (m), to 0.1 % or better.
     pub fn to(deepest: f64) -> Self {
         Self { deepest, depths: 120, tolerance: 1e-3 }
     }

@@ -74,6 +74,8 @@ pub(crate) struct CutNode {
 
 impl<'a> Period<'a> {
     /// Prepares a tooth period at a spindle speed (rad/s), in elements of at most `longest` seconds.
+    ///
+    /// Cost: without a helix the responses of the poles are computed here, once for all depths.
     pub fn new(structure: &'a Structure, cutter: &'a Cutter, spindle: f64, longest: f64) -> Self {
         let mut period = Self { structure, cutter, spindle, longest, straight: None };
         if cutter.is_straight() {
@@ -163,7 +165,8 @@ impl<'a> Period<'a> {
         self.structure.n_states() + chips
     }
 
-    /// Computes the map over one period at a depth.
+    /// Computes the map over one period at a depth (m): the states of the poles first, then the chip
+    /// thicknesses (m) at the nodes in the order of time.
     pub fn at(&self, depth: f64) -> PeriodMap {
         self.with_stretches(depth, |stretches| {
             let mut first = self.structure.n_states();
@@ -319,7 +322,7 @@ impl PeriodMap {
         to.rows_mut(0, self.n_states).copy_from(&state);
     }
 
-    /// Returns the map as a matrix.
+    /// Returns the map as a square matrix; its eigenvalues are the Floquet multipliers.
     pub fn matrix(&self) -> DMatrix<f64> {
         let mut map = DMatrix::zeros(self.size, self.size);
         self.apply(&DMatrix::identity(self.size, self.size), &mut map);

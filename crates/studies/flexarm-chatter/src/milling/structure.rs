@@ -100,7 +100,7 @@ impl Structure {
         self
     }
 
-    /// Returns the structure in other axes, `u_new = R u`.
+    /// Returns the structure in other axes, `u_new = R u`, `F_new = R F`.
     #[must_use]
     pub fn rotated(mut self, R: &Matrix3<f64>) -> Self {
         let R = R.map(|x| Complex::new(x, 0.0));
@@ -116,7 +116,12 @@ impl Structure {
         &self.poles
     }
 
-    /// Returns the frequency response of the tip, `u = G(i ω) F` (m/N), 3×3.
+    /// Returns the frequency response of the tip, `u = G(i ω) F` (m/N), 3×3 in the structure's axes:
+    ///
+    /// ```text
+    /// G(s) = Σ o lᵀ / (s - λ) + conjugates of pairs
+    /// ```
+    /// * `omega`: angular frequency (rad/s).
     pub fn frequency_response(&self, omega: f64) -> Matrix3<Complex<f64>> {
         let s = Complex::new(0.0, omega);
         let mut G = Matrix3::zeros();
