@@ -14,9 +14,9 @@ use nalgebra::{Rotation3, Vector3};
 use serde::Deserialize;
 use toml::Spanned;
 
+use flexarm_run::Error;
 use flexarm_run::robot_file::Source;
 use flexarm_run::toml_file::{parsed, word};
-use flexarm_run::Error;
 
 /// Contents of the file as written.
 #[derive(Debug, Deserialize)]
