@@ -13,6 +13,8 @@ const MAX_NESTED: usize = 40;
 pub struct YamlNode<'t> {
     /// Line, from 1.
     pub line: usize,
+    /// Column, from 1.
+    pub column: usize,
     /// Text, list or map.
     pub value: YamlValue<'t>,
 }
@@ -87,7 +89,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
         })?;
         let (line, column) = (span.start.line(), span.start.col() + 1);
         let fail = |message: String| E::from(YamlError { line, column, message });
-        let new = |value, anchor| SizedNode { node: YamlNode { line, value }, anchor, size: 1, height: 0 };
+        let new = |value, anchor| SizedNode { node: YamlNode { line, column, value }, anchor, size: 1, height: 0 };
         let mut done = None;
         match event {
             Event::Scalar(text, style, anchor, tag) => {

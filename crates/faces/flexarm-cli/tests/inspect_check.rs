@@ -427,7 +427,7 @@ mod check {
             assert!(text.contains(word), "{word}: {text}");
         }
         // It starts at speed, which is not an error.
-        assert!(codes(&found, "warning").contains(&"trajectory".to_owned()), "{found:?}");
+        assert!(codes(&found, "warning").contains(&"motion-start-speed".to_owned()), "{found:?}");
     }
 
     #[test]

@@ -227,7 +227,7 @@ impl PyMotion {
     /// Violated limits of the robot, as sentences; needs a robot.
     #[getter]
     fn violations(&self) -> PyResult<Vec<String>> {
-        Ok(self.bound("violations")?.violations.iter().map(ToString::to_string).collect())
+        Ok(self.bound("violations")?.violations.iter().map(|v| v.warning().message).collect())
     }
 
     /// Doubts about the motion (list of flexarm.Caveat); needs a robot.

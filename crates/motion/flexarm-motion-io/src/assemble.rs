@@ -1,5 +1,11 @@
 //! Builds curves from the messages of a topic: choice of the clock, removal of unusable samples,
 //! choice of velocities.
+//!
+//! Start at [`assemble`]. Messages are either states, one sample of some joints each (`states`), or
+//! plans of several points (`plans`); both end as a [`Line`] of samples per joint. Each choice is a
+//! caveat. Times are in ns in the messages and in s from the first sample in a line; positions are
+//! in rad or m. Not here: reading of messages (`message`), topics (`collect`), curves through the
+//! samples (`flexarm-trajectory`).
 
 use flexarm_settings::Finding;
 use flexarm_trajectory::{JointSamples, SampleError, Samples, Trajectory, TrajectoryError, velocity_mismatch};
@@ -172,14 +178,15 @@ fn tell_ends(lines: &[Line], first: f64, last: f64, caveats: &mut FileCaveats<'_
 
 /// Lines of joints from their states.
 fn states(mut topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
+    // Messages and samples that cannot be used.
     let count: usize = topic.series.iter().map(|series| series.position.len()).sum();
     if topic.without_position > 0 {
         let what = format!("{} of {} messages have no positions and are left out", topic.without_position, topic.count);
         caveats.warn("motion-positions", &what, "");
     }
-    if topic.odd_rates > 0 {
-        let what =
-            format!("the velocities of {} messages are not one for each joint and are left out", topic.odd_rates);
+    if topic.unmatched_rates > 0 {
+        let count = topic.unmatched_rates;
+        let what = format!("the velocities of {count} messages are not one for each joint and are left out");
         caveats.warn("motion-velocities", &what, "");
     }
     let mut not_finite = 0;
@@ -194,6 +201,8 @@ fn states(mut topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> R
         let what = format!("{not_finite} of {count} positions are not numbers and are skipped; the curves bridge them");
         caveats.warn("motion-positions", &what, "look at the recording: a robot that is not connected says so");
     }
+    // One clock and one origin for all joints; the samples of each joint in the order of their
+    // times.
     let use_log = clock(&topic.series, has_clock, caveats)?;
     let origin = |series: &Series| series.times(use_log).iter().copied().min().unwrap_or(i64::MAX);
     let origin = topic.series.iter().map(origin).min().unwrap_or(0);
@@ -207,6 +216,7 @@ fn states(mut topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> R
         differ = differ.max(counts.differ);
         lines.push(line);
     }
+    // What was changed.
     if sorted > 0 {
         caveats.note(
             "motion-stamps",
@@ -284,6 +294,7 @@ impl Series {
 fn clock(series: &[Series], has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result<bool, PlacedProblem> {
     let total: usize = series.iter().map(|series| series.stamp_ns.len()).sum();
     let unset: usize = series.iter().map(|series| series.stamp_ns.iter().filter(|stamp| **stamp == 0).count()).sum();
+    // Stamps that jump back, and stamps that repeat although the position changes.
     let mut back: Option<(f64, usize, &str)> = None;
     let mut changed = 0;
     for series in series {
@@ -298,6 +309,7 @@ fn clock(series: &[Series], has_clock: bool, caveats: &mut FileCaveats<'_>) -> R
             latest = latest.max(stamp);
         }
     }
+    // Reason against the header stamps.
     let why = if unset == total {
         Some("the header stamps are not set".to_owned())
     } else if unset > 0 {
@@ -309,6 +321,7 @@ fn clock(series: &[Series], has_clock: bool, caveats: &mut FileCaveats<'_>) -> R
     } else {
         None
     };
+    // In a bag the times of reception replace them; in a text there are no others.
     match (why, has_clock, back) {
         (None, ..) => {
             if has_clock {
@@ -378,6 +391,7 @@ fn tell_partial(partial: &[String], caveats: &mut FileCaveats<'_>) {
 /// Lines of joints from the points of trajectories. Each message begins at its stamp, otherwise at
 /// its reception, otherwise after the previous one, and replaces the remainder of the previous one.
 fn plans(topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result<Vec<Line>, PlacedProblem> {
+    // Messages with points, and the clock by which they begin.
     let mut lines: Vec<Line> =
         topic.series.iter().map(|series| Line { joint: series.joint.clone(), ..Line::default() }).collect();
     let messages: Vec<&Received> =
@@ -404,6 +418,7 @@ fn plans(topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> Result
         if k == 0 {
             put_start(message, &mut lines, caveats);
         }
+        // The trajectories of a message run one after another, the first one from its beginning.
         let mut from = begin;
         for (i, points) in message.trajectories.iter().enumerate() {
             segments += 1;

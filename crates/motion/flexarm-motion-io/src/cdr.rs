@@ -11,6 +11,8 @@ use crate::value::{Node, Value};
 
 /// Maximum nesting depth of structs.
 const MAX_NESTED: usize = 16;
+/// Values of bytes have no line and column.
+const BYTES: [u32; 2] = [0; 2];
 
 /// Serialisation format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +63,7 @@ impl Bytes<'_> {
         for field in fields {
             pairs.push((field.name.clone(), self.field(definitions, field, depth)?));
         }
-        Ok(Node::new(Value::Map(pairs), 0))
+        Ok(Node::new(Value::Map(pairs), BYTES))
     }
 
     fn field(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, String> {
@@ -78,10 +80,10 @@ impl Bytes<'_> {
         }
         if matches!(field.kind, Kind::Text | Kind::Struct(_) | Kind::Time | Kind::Duration | Kind::Other(_)) {
             let items = (0..count).map(|_| self.value(definitions, field, depth)).collect::<Result<_, _>>()?;
-            return Ok(Node::new(Value::List(items), 0));
+            return Ok(Node::new(Value::List(items), BYTES));
         }
         let numbers: Option<Vec<f64>> = (0..count).map(|_| self.number(&field.kind)).collect();
-        Ok(Node::new(Value::Numbers(numbers.ok_or_else(cut)?), 0))
+        Ok(Node::new(Value::Numbers(numbers.ok_or_else(cut)?), BYTES))
     }
 
     fn value(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, String> {
@@ -102,7 +104,7 @@ impl Bytes<'_> {
             Kind::F32 | Kind::F64 => Value::Number(self.number(&field.kind).ok_or_else(cut)?),
             kind => Value::Whole(self.whole(kind).ok_or_else(cut)?),
         };
-        Ok(Node::new(value, 0))
+        Ok(Node::new(value, BYTES))
     }
 
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {
@@ -155,6 +157,6 @@ impl Bytes<'_> {
 }
 
 fn time(sec: i64, nanosec: i64) -> Node {
-    let pair = |key: &str, value| (Rc::from(key), Node::new(Value::Whole(value), 0));
-    Node::new(Value::Map(vec![pair("sec", sec), pair("nanosec", nanosec)]), 0)
+    let pair = |key: &str, value| (Rc::from(key), Node::new(Value::Whole(value), BYTES));
+    Node::new(Value::Map(vec![pair("sec", sec), pair("nanosec", nanosec)]), BYTES)
 }

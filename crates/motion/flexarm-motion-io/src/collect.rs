@@ -1,4 +1,8 @@
 //! Collects messages by topic and joint, and selects the topic.
+//!
+//! [`Collector::bytes`] and [`Collector::node`] take the messages of a file one after another, with
+//! a bound on the memory that they need; [`Collector::choose`] selects the topic. Not here: the
+//! file formats (`mcap`, `sqlite`, `text`), curves through the samples (`assemble`).
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -60,7 +64,7 @@ pub(crate) struct Topic {
     /// Number of states without a position for each requested joint.
     pub(crate) without_position: usize,
     /// Number of states whose velocities are not one per joint.
-    pub(crate) odd_rates: usize,
+    pub(crate) unmatched_rates: usize,
     /// Problem with one of its messages.
     pub(crate) trouble: Option<PlacedProblem>,
 }
@@ -274,7 +278,7 @@ impl Topic {
         if places.iter().all(Option::is_none) {
             return Ok(0);
         }
-        self.odd_rates += usize::from(state.check()?);
+        self.unmatched_rates += usize::from(state.check()?);
         if state.position.is_empty() {
             self.without_position += 1;
             return Ok(0);

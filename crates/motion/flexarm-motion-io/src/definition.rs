@@ -1,4 +1,7 @@
 //! Definitions of ROS messages: as text (`ros2msg`, `ros1msg`), and built-in ones.
+//!
+//! A definition lists the fields of a type in the order of their bytes; MCAP files hold the
+//! definitions, SQLite files of older bags do not. Not here: decoding of bytes (`cdr`).
 
 use std::collections::HashMap;
 use std::rc::Rc;

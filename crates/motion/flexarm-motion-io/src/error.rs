@@ -36,7 +36,7 @@ pub(crate) enum FilePosition {
     /// The file as a whole.
     Whole,
     /// A line and a column of text, from 1.
-    Text(usize, Option<usize>),
+    Text(usize, usize),
     /// A message of a bag.
     Message { topic: String, number: usize },
 }
@@ -68,9 +68,10 @@ impl PlacedProblem {
         Self { place: FilePosition::Whole, is_without_motion: false, message: message.into() }
     }
 
-    /// A problem at a line of text; 0 means no line.
-    pub(crate) fn at(line: u32, message: impl Into<String>) -> Self {
-        let place = if line > 0 { FilePosition::Text(line as usize, None) } else { FilePosition::Whole };
+    /// A problem at a line and a column of text; line 0 means no place.
+    pub(crate) fn at([line, column]: [u32; 2], message: impl Into<String>) -> Self {
+        let text = FilePosition::Text(line as usize, column as usize);
+        let place = if line > 0 { text } else { FilePosition::Whole };
         Self { place, ..Self::new(message) }
     }
 
@@ -86,7 +87,7 @@ impl PlacedProblem {
         let file = Place::of_file(origin);
         let place = match self.place {
             FilePosition::Whole => file.to_string(),
-            FilePosition::Text(line, column) => Place { column, ..file.line(line) }.to_string(),
+            FilePosition::Text(line, column) => file.at(line, column).to_string(),
             FilePosition::Message { topic, number } => format!("{file}, message {number} on {topic}"),
         };
         MotionError::Content(Box::new(Finding::error("motion", place, self.message, "")))

@@ -20,9 +20,9 @@
 //! | what | read by | messages |
 //! | --- | --- | --- |
 //! | YAML and JSON, also as printed by `ros2 topic echo` and `rostopic echo` | [`read_text`] | those below, at any depth of the text |
-//! | MCAP, chunks plain or compressed by zstd or lz4 | [`read_mcap`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and messages that contain a `JointTrajectory` (CDR of either byte order, ROS 1) |
-//! | SQLite bags (`.db3`) | [`read_db3`] | the same in CDR |
-//! | folders of rosbag2 with `metadata.yaml` | [`read_folder`] | the same; also files compressed as a whole (`.zstd`) |
+//! | MCAP, chunks plain or compressed by zstd or lz4 | [`read_bag`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and messages that contain a `JointTrajectory` (CDR of either byte order, ROS 1) |
+//! | SQLite bags (`.db3`) | [`read_bag`] | the same in CDR |
+//! | folders of rosbag2 with `metadata.yaml` | [`read_bag`] | the same; also files compressed as a whole (`.zstd`) |
 //!
 //! All formats are converted to one tree of values ([`value`]): [`yaml`] builds it from text,
 //! [`cdr`] from bytes by the definition of the message ([`definition`]); [`message`] finds motions
@@ -34,11 +34,11 @@
 #![allow(rustdoc::private_intra_doc_links, reason = "the page describes how the modules work together")]
 
 mod assemble;
+mod bag;
 mod cdr;
 mod collect;
 mod definition;
 mod error;
-mod folder;
 mod mcap;
 mod message;
 #[cfg_attr(not(feature = "sqlite"), path = "no_sqlite.rs")]
@@ -49,8 +49,8 @@ mod value;
 mod write;
 mod yaml;
 
+pub use bag::{SQLITE_MAGIC, read_bag};
 pub use error::MotionError;
-pub use folder::{SQLITE_MAGIC, read_db3, read_folder, read_mcap, read_packed};
 pub use mcap::MCAP_MAGIC;
 pub use text::{is_message_text, read_text};
 pub use unpack::ZSTD_MAGIC;

@@ -1,5 +1,9 @@
 //! Finds motions in the tree of a message by its keys: trajectories of points, joint states,
 //! controller states.
+//!
+//! Start at [`motion_of`]. The type of the message does not matter, so that trajectories within
+//! other messages, such as those of MoveIt, are found. Values are in rad, m and s as in ROS. Not
+//! here: texts and bytes that make the tree (`yaml`, `cdr`).
 
 use std::rc::Rc;
 
@@ -23,8 +27,8 @@ pub(crate) struct State {
     pub(crate) acceleration: Vec<f64>,
     /// Source field of the values: `position`, `reference`, ...
     pub(crate) of: &'static str,
-    /// Line of the message in a text; 0 in a bag.
-    pub(crate) line: u32,
+    /// Line and column of the message in a text; zeros in a bag.
+    pub(crate) place: [u32; 2],
 }
 
 /// A point of a trajectory, with values of the trajectory's joints.
@@ -131,9 +135,10 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProble
         if let Value::Text(_) = item.value {
             return Err(wrong("points", item, "a list of points"));
         }
+        // Values of the point.
         let of = || format!("point {}", i + 1);
         let missing =
-            |key, expected| PlacedProblem::at(item.line, format!("{of} has no `{key}`; {expected}", of = of()));
+            |key, expected| PlacedProblem::at(item.place, format!("{of} has no `{key}`; {expected}", of = of()));
         let positions = item.get("positions").or_else(|| item.get("position"));
         let positions = positions.ok_or_else(|| missing("positions", NO_POSITIONS))?;
         let time = item.get("time_from_start");
@@ -144,6 +149,7 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProble
             velocity: rates(item, "velocities")?,
             acceleration: rates(item, "accelerations")?,
         };
+        // One value for each joint, positions that are numbers, ascending times.
         let columns = [
             ("positions", &point.position, true),
             ("velocities", &point.velocity, false),
@@ -156,7 +162,7 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProble
                 "joint {joint:?}, point {point}: the position is {value}; expected a finite number",
                 point = i + 1
             );
-            return Err(PlacedProblem::at(item.line, message));
+            return Err(PlacedProblem::at(item.place, message));
         }
         let previous = found.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
         if !(point.time_s > previous && point.time_s.is_finite()) {
@@ -166,7 +172,7 @@ fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProble
                  from point to point",
                 point = i + 1
             );
-            return Err(PlacedProblem::at(item.line, message));
+            return Err(PlacedProblem::at(item.place, message));
         }
         found.push(point);
     }
@@ -187,7 +193,7 @@ fn state(node: &Node, names: &Node, values: &Node, of: &'static str) -> Result<S
         velocity: rates(values, velocity)?,
         acceleration: rates(values, acceleration)?,
         of,
-        line: node.line,
+        place: node.place,
     })
 }
 
@@ -201,16 +207,16 @@ impl State {
         let (found, expected) = (self.position.len(), self.joints.len());
         if found != 0 && found != expected {
             let message = format!("`position` has {found} values for {expected} joints; expected one for each name");
-            return Err(PlacedProblem::at(self.line, message));
+            return Err(PlacedProblem::at(self.place, message));
         }
-        let mut is_odd = false;
+        let mut has_unmatched = false;
         for rates in [&mut self.velocity, &mut self.acceleration] {
             if !rates.is_empty() && rates.len() != expected {
                 rates.clear();
-                is_odd = true;
+                has_unmatched = true;
             }
         }
-        Ok(is_odd)
+        Ok(has_unmatched)
     }
 }
 
@@ -227,7 +233,7 @@ fn check_lengths(
             let message = format!(
                 "`{key}` has {found} values for {joints} joints; expected one for each name{hint} (point {point})"
             );
-            return Err(PlacedProblem::at(item.line, message));
+            return Err(PlacedProblem::at(item.place, message));
         }
     }
     Ok(())
@@ -252,7 +258,7 @@ fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, PlacedProblem> {
     sorted.sort_unstable();
     match sorted.windows(2).find(|pair| pair[0] == pair[1]) {
         Some(pair) => Err(PlacedProblem::at(
-            node.line,
+            node.place,
             format!("joint {joint:?} is named twice in one message; each may be there once", joint = pair[0]),
         )),
         None => Ok(names),
@@ -292,9 +298,9 @@ fn wrong(key: &str, node: &Node, expected: &'static str) -> PlacedProblem {
     if let Value::Text(text) = &node.value
         && (text.contains("...") || text.starts_with("<sequence type:") || text.starts_with("<array type:"))
     {
-        return PlacedProblem::at(node.line, SHORTENED_ARRAY);
+        return PlacedProblem::at(node.place, SHORTENED_ARRAY);
     }
-    PlacedProblem::at(node.line, format!("`{key}` is {found}; expected {expected}", found = node.in_words()))
+    PlacedProblem::at(node.place, format!("`{key}` is {found}; expected {expected}", found = node.in_words()))
 }
 
 /// `header.stamp` in ns since 1970; 0 if missing.

@@ -1,4 +1,7 @@
 //! Messages as text: one document, or several as printed by `ros2 topic echo`.
+//!
+//! Start at [`read_text`]; [`is_message_text`] recognises such a text. JSON is YAML here. Not here:
+//! the keys of the messages (`message`).
 
 use flexarm_settings::{Finding, Setting};
 

@@ -6,8 +6,8 @@ use std::rc::Rc;
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
     pub(crate) value: Value,
-    /// Line of text, from 1; 0 for bytes.
-    pub(crate) line: u32,
+    /// Line and column of text, from 1; zeros for bytes.
+    pub(crate) place: [u32; 2],
 }
 
 /// Value of a message.
@@ -25,8 +25,8 @@ pub(crate) enum Value {
 }
 
 impl Node {
-    pub(crate) fn new(value: Value, line: u32) -> Self {
-        Self { value, line }
+    pub(crate) fn new(value: Value, place: [u32; 2]) -> Self {
+        Self { value, place }
     }
 
     /// Value of a key of a map; the last one if the key is repeated.

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use flexarm_trajectory::{Trajectory, TrajectoryError};
 
 /// Maximum number of points in a file.
-const MAX_POINTS: f64 = 5e6;
+const MAX_POINTS: u32 = 5_000_000;
 
 /// Text format of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,11 +27,7 @@ pub fn write_joint_trajectory(
     rate_hz: f64,
     format: TextFormat,
 ) -> Result<String, TrajectoryError> {
-    let duration_s = trajectory.duration();
-    let intervals = duration_s * rate_hz;
-    if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_POINTS) {
-        return Err(TrajectoryError::rate(rate_hz, duration_s));
-    }
+    let (mut times, duration_s) = (trajectory.row_times(rate_hz, MAX_POINTS)?, trajectory.duration());
     let n = trajectory.joints().len();
     let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
     let names: Vec<String> = trajectory.joints().iter().map(|joint| quoted(joint)).collect();
@@ -46,9 +42,7 @@ pub fn write_joint_trajectory(
             names.join(", ")
         ),
     };
-    let regular = (intervals - 1e-6).ceil().max(1.0) as usize;
-    for k in 0..=regular {
-        let seconds = if k == regular { duration_s } else { k as f64 / rate_hz };
+    while let Some(seconds) = times.next() {
         let ns = (seconds * 1e9).round() as i64;
         // Samples at the rounded time that is written.
         trajectory.sample((ns as f64 / 1e9).min(duration_s), &mut q, &mut qdot, &mut qddot);
@@ -65,7 +59,7 @@ pub fn write_joint_trajectory(
                 text,
                 "{{\"positions\": [{q}], \"velocities\": [{v}], \"accelerations\": [{a}], \
                  \"time_from_start\": {{\"sec\": {sec}, \"nanosec\": {nanosec}}}}}{}",
-                if k == regular { "" } else { "," }
+                if times.len() == 0 { "" } else { "," }
             ),
         };
     }

@@ -24,12 +24,12 @@ pub(crate) fn documents(
 
 impl From<YamlError> for PlacedProblem {
     fn from(YamlError { line, column, message }: YamlError) -> Self {
-        let place = FilePosition::Text(line, Some(column));
+        let place = FilePosition::Text(line, column);
         Self { place, ..Self::new(format!("the text is neither YAML nor JSON: {message}")) }
     }
 }
 
-fn node<'t>(YamlNode { line, value }: YamlNode<'t>, keys: &mut HashMap<Cow<'t, str>, Rc<str>>) -> Node {
+fn node<'t>(YamlNode { line, column, value }: YamlNode<'t>, keys: &mut HashMap<Cow<'t, str>, Rc<str>>) -> Node {
     let value = match value {
         YamlValue::Scalar { text, is_plain: true, .. } => plain(&text),
         YamlValue::Scalar { text, .. } => Value::Text(text.as_ref().into()),
@@ -46,7 +46,7 @@ fn node<'t>(YamlNode { line, value }: YamlNode<'t>, keys: &mut HashMap<Cow<'t, s
             Value::Map(pairs)
         }
     };
-    Node::new(value, u32::try_from(line).unwrap_or(u32::MAX))
+    Node::new(value, [line, column].map(|count| u32::try_from(count).unwrap_or(u32::MAX)))
 }
 
 fn numbers_or_list(items: Vec<Node>) -> Value {

@@ -5,10 +5,7 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use flexarm_motion_io::{
-    MessageMotion, MotionError, Request, TextFormat, read_db3, read_folder, read_mcap, read_packed, read_text,
-    write_joint_trajectory,
-};
+use flexarm_motion_io::{MessageMotion, MotionError, Request, TextFormat, read_bag, read_text, write_joint_trajectory};
 use flexarm_trajectory::Trajectory;
 
 const JOINTS: [&str; 2] = ["joint_1", "joint_2"];
@@ -85,7 +82,7 @@ fn a_misspelt_joint_is_an_error_in_every_text_and_every_bag() {
         assert!(found.contains(truth), "{name}: {found}");
     }
     for name in ["states_zstd.mcap", "states_ros1.mcap", "plan.mcap"] {
-        let found = refusal(read_mcap(&data(name), &robot));
+        let found = refusal(read_bag(&data(name), &robot));
         assert!(found.contains(truth), "{name}: {found}");
     }
 }
@@ -114,13 +111,13 @@ fn mcap_files_of_every_packing_and_byte_order_are_the_motion_of_the_csv() {
     for name in
         ["states_zstd.mcap", "states_lz4.mcap", "states_plain.mcap", "states_big_endian.mcap", "states_ros1.mcap"]
     {
-        let motion = read_mcap(&data(name), &ROBOT).unwrap();
+        let motion = read_bag(&data(name), &ROBOT).unwrap();
         assert_same(&motion, "states.csv", name);
         assert_eq!((motion.format, motion.topic.as_deref()), ("MCAP bag", Some("/joint_states")), "{name}");
         assert_eq!(motion.dropped, ["gripper_finger_joint"], "{name}");
     }
     for name in ["plan.mcap", "nested_plan.mcap"] {
-        assert_same(&read_mcap(&data(name), &ROBOT).unwrap(), "plan.csv", name);
+        assert_same(&read_bag(&data(name), &ROBOT).unwrap(), "plan.csv", name);
     }
 }
 
@@ -146,7 +143,7 @@ fn a_small_file_does_not_unpack_without_end() {
         assert!(bytes.len() < 268_435, "{}", bytes.len());
         let path = std::env::temp_dir().join(format!("flexarm-unpack-{}.{ending}", std::process::id()));
         std::fs::write(&path, bytes).unwrap();
-        let error = read_packed(&path, &ROBOT).unwrap_err().to_string();
+        let error = read_bag(&path, &ROBOT).unwrap_err().to_string();
         std::fs::remove_file(&path).unwrap();
         assert!(error.contains("it unpacks to more than 268435456 bytes"), "{ending}: {error}");
     }
@@ -154,7 +151,7 @@ fn a_small_file_does_not_unpack_without_end() {
 
 #[test]
 fn the_set_point_of_a_controller_is_taken_and_not_what_was_measured() {
-    let motion = read_mcap(&data("controller.mcap"), &ROBOT).unwrap();
+    let motion = read_bag(&data("controller.mcap"), &ROBOT).unwrap();
     assert_same(&motion, "states.csv", "controller.mcap");
 }
 
@@ -162,16 +159,16 @@ fn the_set_point_of_a_controller_is_taken_and_not_what_was_measured() {
 fn sqlite_bags_and_folders_with_metadata_are_the_motion_of_the_csv() {
     let bags = ["bag_mcap", "bag_sqlite", "bag_messages_packed", "bag_file_packed"];
     for name in bags.into_iter().take(if cfg!(feature = "sqlite") { 4 } else { 1 }) {
-        assert_same(&read_folder(&data(name), &ROBOT).unwrap(), "states.csv", name);
+        assert_same(&read_bag(&data(name), &ROBOT).unwrap(), "states.csv", name);
     }
     if cfg!(not(feature = "sqlite")) {
-        let error = read_db3(&data("old.db3"), &ROBOT).unwrap_err().to_string();
+        let error = read_bag(&data("old.db3"), &ROBOT).unwrap_err().to_string();
         assert!(error.contains("feature sqlite"), "{error}");
         return;
     }
-    assert_same(&read_db3(&data("old.db3"), &ROBOT).unwrap(), "states.csv", "old.db3");
+    assert_same(&read_bag(&data("old.db3"), &ROBOT).unwrap(), "states.csv", "old.db3");
     let packed = data("bag_file_packed/bag_file_packed.db3.zstd");
-    let motion = read_packed(&packed, &ROBOT).unwrap();
+    let motion = read_bag(&packed, &ROBOT).unwrap();
     assert_same(&motion, "states.csv", "a packed file alone");
     assert_eq!(motion.format, "SQLite bag");
 }
@@ -179,7 +176,7 @@ fn sqlite_bags_and_folders_with_metadata_are_the_motion_of_the_csv() {
 #[test]
 fn of_two_topics_the_states_are_taken_and_the_choice_is_told_and_can_be_made() {
     let path = data("both.mcap");
-    let motion = read_mcap(&path, &ROBOT).unwrap();
+    let motion = read_bag(&path, &ROBOT).unwrap();
     assert_eq!(motion.topic.as_deref(), Some("/joint_states"));
     let said = told(&motion);
     assert!(
@@ -188,14 +185,14 @@ fn of_two_topics_the_states_are_taken_and_the_choice_is_told_and_can_be_made() {
         "{said:#?}"
     );
     let asked = Request { topic: Some("arm_controller/controller_state"), ..ROBOT };
-    let motion = read_mcap(&path, &asked).unwrap();
+    let motion = read_bag(&path, &asked).unwrap();
     assert_eq!(motion.topic.as_deref(), Some("/arm_controller/controller_state"));
     assert!(!told(&motion).iter().any(|line| line.contains("motion-topic")));
 }
 
 #[test]
 fn without_a_robot_every_joint_is_kept() {
-    let motion = read_mcap(&data("states_zstd.mcap"), &Request::default()).unwrap();
+    let motion = read_bag(&data("states_zstd.mcap"), &Request::default()).unwrap();
     assert_eq!(motion.trajectory.joints(), ["joint_1", "joint_2", "gripper_finger_joint"]);
     assert!(motion.dropped.is_empty());
 }
@@ -221,7 +218,7 @@ fn a_bag_that_is_cut_off_is_read_up_to_there_and_says_so() {
         let whole = std::fs::read(&folder).unwrap();
         let path = place.join("cut.db3");
         std::fs::write(&path, &whole[..(part * whole.len() as f64) as usize]).unwrap();
-        read_db3(&path, &ROBOT)
+        read_bag(&path, &ROBOT)
     };
     // A database has its pages in any order: the remainder is a part of the motion, or an error.
     let refusal = if cfg!(feature = "sqlite") { "cannot be read" } else { "feature sqlite" };
@@ -237,7 +234,7 @@ fn a_bag_that_is_cut_off_is_read_up_to_there_and_says_so() {
         let mut last = usize::MAX;
         for part in [0.75, 0.5, 0.4] {
             std::fs::write(&path, &whole[..(part * whole.len() as f64) as usize]).unwrap();
-            match read_mcap(&path, &ROBOT) {
+            match read_bag(&path, &ROBOT) {
                 Ok(motion) => {
                     assert!(motion.samples < 27 && motion.samples <= last, "{name}");
                     last = motion.samples;
@@ -580,19 +577,19 @@ fn aliases_that_multiply_and_deep_nesting_are_refused() {
 #[test]
 fn what_is_wrong_with_a_bag_is_told() {
     let asked = |topic| Request { topic: Some(topic), ..ROBOT };
-    let found = refusal(read_mcap(&data("both.mcap"), &asked("/nothing")));
+    let found = refusal(read_bag(&data("both.mcap"), &asked("/nothing")));
     assert!(found.contains("the topic \"/nothing\" (topic) is not in the file; topics with motions are /arm_controller/controller_state (control_msgs/msg/JointTrajectoryControllerState, 26 messages)"), "{found}");
-    let found = refusal(read_mcap(&data("states_zstd.mcap"), &asked("/chatter")));
+    let found = refusal(read_bag(&data("states_zstd.mcap"), &asked("/chatter")));
     assert!(found.contains("has messages of the type std_msgs/msg/String, which hold no motion"), "{found}");
     let other = Request { joints: Some(&["axis_1"]), topic: None };
-    let found = refusal(read_mcap(&data("states_zstd.mcap"), &other));
+    let found = refusal(read_bag(&data("states_zstd.mcap"), &other));
     assert!(
         found.contains("none of the names \"gripper_finger_joint\", \"joint_1\", \"joint_2\" is a joint of the robot"),
         "{found}"
     );
-    let found = refusal(read_folder(&data(""), &ROBOT));
+    let found = refusal(read_bag(&data(""), &ROBOT));
     assert!(found.contains("it has no metadata.yaml and files of several bags; give one of the files"), "{found}");
-    let found = refusal(read_folder(&data("nothing"), &ROBOT));
+    let found = refusal(read_bag(&data("nothing"), &ROBOT));
     assert!(found.starts_with("cannot read motion "), "{found}");
 }
 
@@ -621,7 +618,7 @@ fn sizes_that_a_bag_makes_up_are_refused() {
     for (bytes, expected) in cases {
         let path = place.join("made_up.mcap");
         std::fs::write(&path, [b"\x89MCAP0\r\n", &bytes[..]].concat()).unwrap();
-        let found = refusal(read_mcap(&path, &ROBOT));
+        let found = refusal(read_bag(&path, &ROBOT));
         assert!(found.contains(expected) && found.contains("no motion before"), "{expected}: {found}");
     }
     std::fs::remove_dir_all(&place).unwrap();
@@ -646,7 +643,7 @@ fn bytes_changed_anywhere_in_a_bag_end_in_a_motion_or_an_error() {
             }
             let path = place.join(name);
             std::fs::write(&path, &bytes).unwrap();
-            let read = if name.ends_with("db3") { read_db3(&path, &ROBOT) } else { read_mcap(&path, &ROBOT) };
+            let read = read_bag(&path, &ROBOT);
             match read {
                 Ok(motion) => assert!(motion.trajectory.duration() > 0.0),
                 Err(error) => assert!(!error.to_string().is_empty()),

@@ -1,8 +1,14 @@
 //! The arm that runs a program, and the resolution of its paths.
+//!
+//! Frames: M world of the model, W world of the controller, B base of a move, F flange of the
+//! controller, T tool. Axes are the controller's, coordinates the model's; [`ProgramArm::set_axes`]
+//! and [`ProgramArm::axis_values`] convert. Not here: the robot file that defines them.
 
 use flexarm_kinematics::{ControllerAxes, Frame, Model, NullSpaceRule};
 use flexarm_spatial::Pose;
 use nalgebra::DVector;
+
+use crate::program::Move;
 
 /// Limits of a joint while it follows a program.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +68,18 @@ pub struct ProgramArm<'m> {
     pub starts_at_rest: bool,
 }
 
+/// Returns the frame of the tool of a move: its own tool or the robot's on the flange of the rigid
+/// arm.
+pub fn tool_of(arm: &ProgramArm<'_>, of: &Move) -> Frame {
+    let X_FT = of.X_FT.unwrap_or(arm.X_FT);
+    Frame { X_BF: arm.flange.X_BF * X_FT, ..arm.flange.clone() }
+}
+
+/// Returns the pose of the base of a move in the world of the model, `X_MB`.
+pub fn base_of(arm: &ProgramArm<'_>, of: &Move) -> Pose {
+    arm.X_MW * of.X_WB
+}
+
 /// Definition of a controller axis. The joint value is
 ///
 /// ```text
@@ -85,7 +103,10 @@ impl ControllerAxis {
 }
 
 impl ProgramArm<'_> {
-    /// Sets the coordinates of the controller's first axes from axis values.
+    /// Sets the coordinates of the controller's first axes from axis values (rad or m).
+    ///
+    /// * `values`: one for each axis, or fewer; the coordinates of the others stay.
+    /// * `q`: all independent coordinates of the model.
     pub fn set_axes(&self, values: &[f64], q: &mut DVector<f64>) {
         for (n, (value, &k)) in values.iter().zip(&self.axes).enumerate() {
             let axis = self.controller.get(n).unwrap_or(&ControllerAxis::SAME);

@@ -1,7 +1,12 @@
 //! Time-optimal law with an averaged speed: accelerations rise within a given time.
+//!
+//! The average over a window T keeps the bounds of the law behind it only where these change
+//! slowly; elsewhere the law is slowed and tried again. Start at [`kept`]. Not here: bounded jerks
+//! of joints (`jerk_bounded`).
+
+use flexarm_trajectory::time_law::{Law, LawError, PathPoint, least_time};
 
 use crate::route::Route;
-use crate::time_law::{Law, LawError, PathPoint, least_time};
 
 /// Relative tolerance of limits.
 pub(crate) const SLACK: f64 = 1e-3;
@@ -25,8 +30,8 @@ pub(crate) fn kept(points: &[PathPoint], route: &Route, rise: f64) -> Result<(La
     let mut best: Option<(Law, f64)> = None;
     let mut vain = 0;
     for _ in 0..ATTEMPTS {
-        // Least-time law under the present bounds, averaged over the window, slowed to keep all bounds:
-        // speeds by √(ratio of squares), jerk by its cube root.
+        // Least-time law under the present bounds, averaged over the window, slowed to keep all
+        // bounds: speeds by √(ratio of squares), jerk by its cube root.
         let x = least_time(&slowed)?;
         let raw = Law::new(&s, &x);
         let law = raw.clone().smoothed(window);

@@ -109,7 +109,7 @@ impl<'m> Branches<'m> {
         configuration: &Configuration,
         near: &DVector<f64>,
     ) -> Result<DVector<f64>, NoBranch> {
-        if !matches!(configuration, Configuration::Nearest | Configuration::Near(_)) {
+        if selection(configuration) != Selection::Nearest {
             let why = "the target names a branch of the inverse kinematics, and this arm is not of six revolute joints with a \
                        solution in closed form: name joint values in its place";
             return Err(NoBranch(why.to_owned()));
@@ -124,11 +124,9 @@ impl<'m> Branches<'m> {
 }
 
 fn selection(configuration: &Configuration) -> Selection {
-    match *configuration {
-        Configuration::Nearest | Configuration::Near(_) => Selection::Nearest,
-        Configuration::Kuka { status, turn } => Selection::Kuka { status, turn },
-        Configuration::Abb { quadrants, cfx } => Selection::Abb { quadrants, cfx },
-        Configuration::Words { front, elbow_up, wrist_flipped } => Selection::Words { front, elbow_up, wrist_flipped },
+    match configuration {
+        Configuration::Near(_) => Selection::Nearest,
+        Configuration::Selected(selection) => *selection,
     }
 }
 
@@ -144,6 +142,7 @@ fn why_none(arm: &AnalyticArm, counted: &ControllerAxes, solutions: &Solutions, 
             None => "it is out of reach".to_owned(),
         };
     }
+    // Solutions, with whole turns of their joints, within the limits.
     let mut within: Vec<[f64; 6]> = Vec::new();
     for solution in solutions.iter() {
         arm.copies_within_limits(&solution.q, |q| within.push(*q));
@@ -152,6 +151,7 @@ fn why_none(arm: &AnalyticArm, counted: &ControllerAxes, solutions: &Solutions, 
         let joints = joints_beyond(arm, solutions);
         return format!("all {} solutions pass the limits of joints ({joints})", solutions.len());
     }
+    // Branches that these are on, in the words of the controller.
     let said = |q: &[f64; 6]| match selection {
         Selection::Kuka { .. } => {
             let status = arm.kuka_status(q, counted)?;

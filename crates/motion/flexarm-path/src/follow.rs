@@ -10,7 +10,9 @@
 //! follow (least squares, then a check). For an arm with more than six joints, joints are held
 //! until six are left, or move according to [`FrameCurve::guided`].
 //!
-//! Start at [`Follower::start`], then [`Follower::advance`].
+//! Start at [`Follower::start`], then [`Follower::advance`]. `s` is in m, poses are in the world of
+//! the model. Not here: the curves ([`crate::ToolCurve`]), branches of the inverse kinematics
+//! (`branch`).
 
 use flexarm_kinematics::{
     Data, Frame, Model, State, forward_kinematics, forward_kinematics_velocity, frame_jacobian,
@@ -125,7 +127,8 @@ pub struct Follower<'m> {
     active: Vec<usize>,
 }
 
-/// Returns the indices of the coordinates that move a frame, ascending.
+/// Returns the indices of the actuated coordinates that move a frame, ascending: those whose column
+/// of the Jacobian is not zero at a generic pose.
 pub fn coordinates_of(model: &Model, frame: &Frame) -> Vec<usize> {
     let mut data = Data::new(model);
     let mut J = Matrix6xX::zeros(model.nv());
@@ -162,7 +165,8 @@ impl<'m> Follower<'m> {
         follower
     }
 
-    /// Joints that are held while the others follow, if the arm has more than six.
+    /// Returns the coordinates that are held while the others follow, ascending; empty for an arm
+    /// with six joints or fewer.
     pub fn fixed_joints(&self) -> Vec<usize> {
         let moving = coordinates_of(self.model, &self.frame);
         moving.into_iter().filter(|k| !self.active.contains(k)).collect()
@@ -228,12 +232,14 @@ impl<'m> Follower<'m> {
 
     /// Joint values and derivatives at `s` of a path, from nearby values.
     fn jet(&mut self, way: &FrameCurve, s: f64, near: &DVector<f64>) -> Option<JointJet> {
+        // Values: guided joints by their polynomials, the others by Newton's method.
         let tool = way.curve.at(s);
         let mut q = near.clone();
         for (k, [value, ..]) in way.guides(s) {
             q[k] = value;
         }
         self.correct(&tool.X, &mut q)?;
+        // J d = V, and J dd = A - J' d, less the part of the guided joints.
         let mut d = DVector::zeros(q.len());
         let mut V = tool.V;
         for (k, [_, rate, _]) in way.guides(s) {
@@ -260,15 +266,16 @@ impl<'m> Follower<'m> {
         Some(JointJet { q, d, dd })
     }
 
-    /// Speed of the frame's origin for the joint rates `d` (m per unit of the parameter).
+    /// Returns the speed of the frame's origin for the joint rates `d` (m per unit of the
+    /// parameter).
     pub fn speed(&mut self, jet: &JointJet) -> f64 {
         forward_kinematics(self.model, &mut self.data, &jet.q);
         frame_jacobian(self.model, &self.data, &self.frame, &mut self.J);
         (&self.J * &jet.d).fixed_rows::<3>(0).norm()
     }
 
-    /// Distance of the frame from a curve's pose at `s`: maximum of position (m) and rotation (rad)
-    /// errors.
+    /// Returns the distance of the frame from a curve's pose at `s`: maximum of position (m) and
+    /// rotation (rad) errors.
     pub fn distance(&mut self, curve: &ToolCurve, s: f64, q: &DVector<f64>) -> f64 {
         forward_kinematics(self.model, &mut self.data, q);
         let (X, target) = (self.data.X_WF(&self.frame), curve.at(s).X);
@@ -276,12 +283,14 @@ impl<'m> Follower<'m> {
         p.norm().max(rotation_vector((target.rotation * X.rotation.inverse()).matrix()).norm())
     }
 
-    /// Minimum singular value of the Jacobian at the last point, m/rad.
+    /// Returns the minimum singular value of the Jacobian at the last point (m/rad), with rotations
+    /// scaled by [`TURN_LENGTH`].
     pub fn sigma(&self) -> f64 {
         self.scaled(&self.active).singular_values().min()
     }
 
-    /// Joint values and derivatives at `s`, where a path begins, from joint values near that pose.
+    /// Returns joint values and derivatives at `s`, where a path begins, from joint values `q` near
+    /// that pose (all independent coordinates, rad or m).
     ///
     /// # Errors
     /// [`Blocked`] if the pose is not reached near these values, or the arm is singular there.
@@ -289,7 +298,8 @@ impl<'m> Follower<'m> {
         self.jet(way, s, q).ok_or_else(|| self.blocked(s, q))
     }
 
-    /// Joint values and derivatives at `to`, from those at `from`; either may be the larger.
+    /// Returns joint values and derivatives at `to` by continuation from those at `from`; either
+    /// parameter may be the larger.
     ///
     /// # Errors
     /// [`Blocked`] if the arm cannot reach that far on this branch, or passes a singular pose.
@@ -301,6 +311,7 @@ impl<'m> Follower<'m> {
             let step = next - s;
             let predicted = &jet.q + &jet.d * step + &jet.dd * (0.5 * step * step);
             let moved = (&predicted - &jet.q).amax() <= 0.5;
+            // A step is good if Newton's method ends near the prediction: the branch is the same.
             let found = if moved { self.jet(way, next, &predicted) } else { None };
             match found.filter(|found| (&found.q - &predicted).amax() <= SURPRISE) {
                 Some(found) => (s, jet, h) = (next, found, 2.0 * h),

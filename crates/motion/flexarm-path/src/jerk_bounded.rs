@@ -1,11 +1,12 @@
 //! Time-optimal law of a route with joint jerk limits. Every moving joint gets a jerk limit:
 //! without a given one it is such that the acceleration rises to its limit in a given time.
 
+use flexarm_trajectory::jerk_law::{QuinticLaw, least_time_with_jerks};
+use flexarm_trajectory::time_law::{Law, LawError, PathPoint, least_time};
+
 use crate::arm::ProgramArm;
-use crate::jerk_law::{QuinticLaw, least_time_with_jerks};
 use crate::limits::Limits;
 use crate::route::Route;
-use crate::time_law::{Law, LawError, PathPoint, least_time};
 
 /// A law with the jerk limits that it keeps.
 pub(crate) struct JerkBounded {

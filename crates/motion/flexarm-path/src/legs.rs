@@ -1,11 +1,16 @@
 //! Converts the moves of a program to paths from target to target, with the joints at both ends.
+//!
+//! Start at [`Legs::up_to_stop`]. A path of the tool is a curve in the world M of the model; its
+//! joints at the end follow from those at the start by continuation, so that a line keeps the
+//! branch of the inverse kinematics. Lengths are in m. Not here: blends (`route`), times
+//! (`schedule`).
 
 use flexarm_kinematics::{Data, Frame, IkOptions, inverse_kinematics_with_rule};
 use flexarm_settings::{Finding, Place};
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3, Vector6};
 
-use crate::arm::{PathOptions, ProgramArm};
+use crate::arm::{PathOptions, ProgramArm, base_of, tool_of};
 use crate::branch::{Branches, NoBranch};
 use crate::curve::{ToolCurve, ToolJet};
 use crate::error::{BLOCKED, at_item, at_move, no_move};
@@ -94,12 +99,6 @@ impl<'m> Legs<'m> {
         Self { arm: arm.clone(), options: options.clone(), branches, followers: Vec::new(), hold }
     }
 
-    /// Frame of the tool of a move on the flange.
-    pub(crate) fn tool_frame(&self, of: &Move) -> Frame {
-        let X_FT = of.X_FT.unwrap_or(self.arm.X_FT);
-        Frame { X_BF: self.arm.flange.X_BF * X_FT, ..self.arm.flange.clone() }
-    }
-
     /// Returns the follower of a frame: one per tool, so that a redundant arm always holds the same
     /// joints.
     pub(crate) fn follower(&mut self, frame: &Frame, q: &DVector<f64>) -> &mut Follower<'m> {
@@ -160,20 +159,20 @@ impl<'m> Legs<'m> {
         if of.kind == MoveKind::Joint {
             return self.joint_leg(of, start);
         }
-        let frame = self.tool_frame(of);
+        let frame = tool_of(&self.arm, of);
         let X0 = self.pose(&frame, &start.q);
         let curve = self.tool_curve(of, &X0)?;
         self.tool_leg(of, frame, curve, start)
     }
 
     fn tool_curve(&mut self, of: &Move, X0: &Pose) -> Result<ToolCurve, Box<Finding>> {
-        let X_MB = self.arm.X_MW * of.X_WB;
+        let X_MB = base_of(&self.arm, of);
         let X1 = match &of.to {
             Target::Pose { X_BT, .. } => X_MB * X_BT,
             // A line to joint values (movel with a list of joints) goes to their pose.
             Target::Joints(values) => {
                 let q = self.with_axes(of, values, &self.arm.rest.clone())?;
-                let frame = self.tool_frame(of);
+                let frame = tool_of(&self.arm, of);
                 self.pose(&frame, &q)
             }
         };
@@ -220,12 +219,12 @@ impl<'m> Legs<'m> {
     }
 
     fn joint_leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, Box<Finding>> {
-        let frame = self.tool_frame(of);
+        let frame = tool_of(&self.arm, of);
         let q1 = match &of.to {
             Target::Joints(values) => self.with_axes(of, values, &start.q)?,
             Target::Pose { X_BT, configuration } => {
-                let X = self.arm.X_MW * of.X_WB * X_BT;
-                let choice = self.branches.choose(&frame, &X, configuration, &start.q, &self.arm);
+                let X_MT = base_of(&self.arm, of) * X_BT;
+                let choice = self.branches.choose(&frame, &X_MT, configuration, &start.q, &self.arm);
                 choice.map_err(|NoBranch(why)| unreachable(of, &why))?
             }
         };
@@ -276,10 +275,12 @@ impl<'m> Legs<'m> {
         if left_over.is_empty() {
             return None;
         }
+        // The posture that the rule wants at the end of the path.
         let (model, X1) = (self.arm.model, way.curve.at(length).X);
         let mut data = Data::new(model);
         let options = IkOptions::default();
         let wanted = inverse_kinematics_with_rule(model, &mut data, &way.frame, &X1, q1, &options, &rule).ok()?.q;
+        // The part of the way there that the joints have time for, halved until the arm can follow.
         let largest_part = left_over
             .iter()
             .map(|&k| self.largest_change(of, k, length) / (wanted[k] - q0[k]).abs())
@@ -313,17 +314,17 @@ impl<'m> Legs<'m> {
 
     /// Legs of a spline through the targets of consecutive moves.
     pub(crate) fn spline(&mut self, group: &[&Move], start: &mut Start) -> Result<Vec<Leg>, Box<Finding>> {
-        let frame = self.tool_frame(group[0]);
+        let frame = tool_of(&self.arm, group[0]);
         let mut poses = vec![self.pose(&frame, &start.q)];
         let mut owners: Vec<&Move> = Vec::new();
         for of in group {
             let Target::Pose { X_BT, .. } = &of.to else {
                 return Err(unreachable(of, "a spline goes through poses, not through joint values"));
             };
-            let X = self.arm.X_MW * of.X_WB * X_BT;
+            let X_MT = base_of(&self.arm, of) * X_BT;
             let last = &poses[poses.len() - 1];
-            if (X.translation.vector - last.translation.vector).norm() > 1e-9 {
-                poses.push(X);
+            if (X_MT.translation.vector - last.translation.vector).norm() > 1e-9 {
+                poses.push(X_MT);
                 owners.push(of);
             }
         }
@@ -360,6 +361,7 @@ fn spline_curves(poses: &[Pose]) -> Vec<ToolCurve> {
     let p: Vec<Vector3<f64>> = poses.iter().map(|X| X.translation.vector).collect();
     let h: Vec<f64> = p.windows(2).map(|pair| (pair[1] - pair[0]).norm()).collect();
     let n = h.len();
+    // Rotation vectors per length between neighbouring poses.
     let second = natural_second_derivatives(&p, &h);
     let turns: Vec<Vector3<f64>> = poses
         .windows(2)
@@ -372,6 +374,7 @@ fn spline_curves(poses: &[Pose]) -> Vec<ToolCurve> {
         } else {
             (p[k] - p[k - 1]) / h[k - 1] + (second[k - 1] + second[k] * 2.0) * (h[k - 1] / 6.0)
         };
+        // At inner knots the turning rate of the parabola through three poses.
         let turn = match k {
             0 => turns[0],
             k if k == n => turns[n - 1],

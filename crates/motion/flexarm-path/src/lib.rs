@@ -69,13 +69,18 @@ mod route;
 mod schedule;
 mod targets;
 
-pub use flexarm_trajectory::{jerk_law, time_law};
-
-pub use arm::{ControllerAxis, JointBounds, PathOptions, ProgramArm};
-pub use curve::{ArcError, TURN_LENGTH, ToolCurve, ToolJet};
+pub use arm::{ControllerAxis, JointBounds, PathOptions, ProgramArm, base_of, tool_of};
+pub use curve::{ArcError, ToolCurve, ToolJet};
 pub use error::BLOCKED;
-pub use follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet, coordinates_of};
+pub use follow::coordinates_of;
 pub use plan::plan;
 pub use planned::{Planned, PlannedMove, Slowed, SlowedBy};
 pub use range::{OutOfRange, check_axes, check_rate};
-pub use targets::{base_of, target_at, target_joints, tool_of};
+pub use targets::{target_at, target_joints};
+
+/// Parts that the tests of this crate reach; not part of the interface.
+#[doc(hidden)]
+pub mod internals {
+    pub use crate::curve::TURN_LENGTH;
+    pub use crate::follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet};
+}

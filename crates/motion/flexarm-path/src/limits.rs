@@ -2,14 +2,14 @@
 //! slows a move.
 
 use flexarm_kinematics::{Data, State, inverse_dynamics};
+use flexarm_trajectory::jerk_law::{JerkBound, PathBounds};
+use flexarm_trajectory::time_law::{Bound, Law, PathPoint};
 use nalgebra::{DVector, Vector3, Vector6};
 
 use crate::arm::{JointBounds, ProgramArm};
 use crate::curve::ToolJet;
-use crate::jerk_law::{JerkBound, PathBounds};
 use crate::planned::SlowedBy;
 use crate::route::{Piece, Route, Station};
-use crate::time_law::{Bound, Law, PathPoint};
 
 /// Number of points along a route with few stations, and minimum and maximum number of parts per
 /// station.

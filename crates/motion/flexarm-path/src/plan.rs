@@ -1,4 +1,7 @@
 //! Public interface of the planner: converts a program to joint motions over time.
+//!
+//! Start at [`plan`]: moves become legs (`legs`), legs between two stops a route (`route`), a route
+//! gets its time law (`schedule`), and the knots of all routes make the curves.
 
 use flexarm_kinematics::Model;
 use flexarm_settings::Finding;
@@ -20,7 +23,8 @@ const STILL: f64 = 1e-12;
 /// Plans the motion of a program.
 ///
 /// # Errors
-/// A [`Finding`] at the statement, for targets out of reach, paths through singular poses, contradictory statements.
+/// A [`Finding`] at the statement, for targets out of reach, paths through singular poses,
+/// contradictory statements.
 pub fn plan(program: &Program, arm: &ProgramArm<'_>, options: &PathOptions) -> Result<Planned, Box<Finding>> {
     let moving = coordinates_of(arm.model, &arm.flange);
     if moving.len() != 7 {

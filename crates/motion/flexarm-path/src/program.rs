@@ -9,6 +9,7 @@
 //! Frames: W world of the controller (base of its robot, ROS's `base`), B base or work object of a
 //! move, F flange of the controller (ROS's `tool0`), T tool.
 
+pub use flexarm_kinematics::Selection;
 use flexarm_settings::{Finding, Place};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
@@ -106,40 +107,18 @@ pub enum Target {
 }
 
 /// Branch of the inverse kinematics.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Configuration {
-    /// Solution nearest to the start of the move (lines and arcs have no choice).
-    #[default]
-    Nearest,
     /// Solution nearest to these joint values, rad or m.
     Near(Vec<f64>),
-    /// KUKA's status and turn. Status: bit 0 wrist centre behind axis 1, bit 1 elbow (axis 3
-    /// positive, minus the angle of the forearm's offset), bit 2 axis 5 negative; bits 3 and 4 do
-    /// not specify a branch. Turn: bit k set if axis k+1 is negative.
-    Kuka {
-        /// Bits of S; `None`: not given.
-        status: Option<u8>,
-        /// Bits of T; `None`: not given.
-        turn: Option<u8>,
-    },
-    /// ABB's confdata: quarter turns of axes 1, 4 and 6 (floor of the angle over 90 degrees), and
-    /// the configuration number cfx (0 to 7).
-    Abb {
-        /// Quadrants of axes 1, 4, 6.
-        quadrants: [i32; 3],
-        /// `cfx`.
-        cfx: i32,
-    },
-    /// Words: wrist centre in front of or behind axis 1, elbow up or down, wrist not flipped or
-    /// flipped (axis 5 negative); the nearest solution decides those not given.
-    Words {
-        /// Whether the wrist centre is in front of axis 1.
-        front: Option<bool>,
-        /// Whether the elbow is above the line from shoulder to wrist.
-        elbow_up: Option<bool>,
-        /// Whether axis 5 is negative.
-        wrist_flipped: Option<bool>,
-    },
+    /// Solution that the words of a controller select; if they leave several, the nearest to the
+    /// start of the move.
+    Selected(Selection),
+}
+
+impl Configuration {
+    /// Solution nearest to the start of the move; lines and arcs have no choice.
+    pub const NEAREST: Self = Self::Selected(Selection::Nearest);
 }
 
 /// Speeds and accelerations of a move. `None` means no bound of its own: the robot's limits and the

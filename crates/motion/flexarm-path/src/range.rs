@@ -108,6 +108,7 @@ impl Move {
             turned.iter().try_for_each(|X| check_pose("", X))?;
             angle.map_or(Ok(()), |angle| within("the angle of the arc", "rad", angle, [-FARTHEST, FARTHEST]))?;
         }
+        // Speeds and accelerations, the duration, and the blend.
         let speed = &self.speed;
         let rates = [
             ("the speed of the path", "m/s", speed.linear_m_s),

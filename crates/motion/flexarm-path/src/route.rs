@@ -1,10 +1,15 @@
 //! Routes from one stop to the next: legs joined by blends, with the joints at points along them.
+//!
+//! Start at [`Route::all`]. Legs are trimmed where a blend begins ([`blend_reach`]); each section
+//! between seams is a [`Piece`], with [`Station`]s so close that quintics between them follow the
+//! path. The parameter `s` runs from the start of the route, in m; derivatives of the joints are by
+//! `s`. Not here: paths of single moves (`legs`), times along the route (`schedule`).
 
 use flexarm_settings::{Finding, Place};
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DVector, Vector3};
 
-use crate::arm::PathOptions;
+use crate::arm::{PathOptions, tool_of};
 use crate::curve::{TURN_LENGTH, ToolCurve, ToolJet};
 use crate::follow::{Blocked, Follower, FrameCurve, GuidedJoint, JointJet, between};
 use crate::legs::{Leg, LegPath, Legs, blocked_error};
@@ -145,6 +150,7 @@ impl Route {
 
     /// Appends stations along a stretch.
     fn add(&mut self, owner: &mut Legs<'_>, stretch: Stretch) -> Result<(), Box<Finding>> {
+        // Joints at points along the stretch, and the tool there if it follows a curve.
         let options = owner.options.clone();
         let (points, tool, sigma) = match &stretch.way {
             LegPath::Tool(way) => {
@@ -163,6 +169,8 @@ impl Route {
             (LegPath::Tool(_), _) | (_, None) => Vec::new(),
             (_, Some(_)) => travel(owner, &self.legs[stretch.leg], &points),
         };
+        // The first point is the last station of the piece before, whose second derivative may
+        // jump.
         let origin = self.stations.last().map_or(0.0, |last| last.s) - stretch.range[0];
         let first = self.stations.len().saturating_sub(1);
         for (k, (s, jet)) in points.into_iter().enumerate() {
@@ -184,7 +192,7 @@ impl Route {
 
 /// Speed of the tool centre point per unit of the parameter in a joint move.
 fn travel(owner: &mut Legs<'_>, leg: &Leg, points: &[(f64, JointJet)]) -> Vec<f64> {
-    let frame = owner.tool_frame(&leg.of);
+    let frame = tool_of(&owner.arm, &leg.of);
     let near = &leg.q0;
     let follower = owner.follower(&frame, near);
     points.iter().map(|(_, jet)| follower.speed(jet)).collect()
@@ -271,7 +279,7 @@ fn angle_between(a: &Pose, b: &Pose) -> f64 {
 /// Distance in the parameter from the corner at which `away` reaches `most`.
 fn from_corner(owner: &mut Legs<'_>, leg: &Leg, most: f64, at_end: bool, away: impl Fn(&Pose, &Pose) -> f64) -> f64 {
     let place = |s: f64| if at_end { leg.length - s } else { s };
-    let frame = owner.tool_frame(&leg.of);
+    let frame = tool_of(&owner.arm, &leg.of);
     let mut pose = |s: f64| match &leg.way {
         LegPath::Tool(way) => way.curve.at(place(s)).X,
         way => owner.pose(&frame, &joint_jet(way, leg.length, place(s)).q),
@@ -306,6 +314,8 @@ fn stretches(owner: &mut Legs<'_>, legs: &[Leg], taken: &[[f64; 2]]) -> Result<V
         if out + into <= SHORTEST_BLEND {
             continue;
         }
+        // A blend of the tool keeps its pose and two derivatives at both ends; where the tool
+        // changes, or a leg is in joint space, the blend is in joint space.
         let length = out + into;
         let way = match (&leg.way, &next.way) {
             (LegPath::Tool(way), LegPath::Tool(other)) if way.frame.X_BF == other.frame.X_BF => {

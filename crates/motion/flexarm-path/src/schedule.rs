@@ -1,7 +1,17 @@
 //! A route over time: its time law, the knots of the joint curves, and the results of its moves.
+//!
+//! Start at [`Schedule::new`], then [`Schedule::write_within`]. With `q(s)` of the route and `s(t)`
+//! of the law, the joints over time are quintics through knots with
+//!
+//! ```text
+//! q̇ = q' ṡ,    q̈ = q'' ṡ² + q' s̈,    q⃛ = q''' ṡ³ + 3 q'' ṡ s̈ + q' s⃛
+//! ```
+//! so close that they follow the path. Times are in s from the start of the route. Not here: the
+//! bounds (`limits`), the search for the law (`averaged`, `jerk_bounded`).
 
 use flexarm_kinematics::Model;
 use flexarm_settings::Finding;
+use flexarm_trajectory::time_law::{Law, LawError, Progress};
 use flexarm_trajectory::{JointKnots, JointPeak, LONGEST, Trajectory, TrajectoryError};
 use nalgebra::DVector;
 
@@ -13,7 +23,6 @@ use crate::jerk_bounded::JerkBounded;
 use crate::limits::{Cap, LimitedPath, Limits};
 use crate::planned::{PlannedMove, Slowed, SlowedBy};
 use crate::route::{Route, Station};
-use crate::time_law::{Law, LawError, Progress};
 
 /// Relative tolerance of joint limits, tighter than that of the checks.
 const ROUNDING: f64 = 1e-10;
@@ -54,6 +63,13 @@ impl Knot {
     pub(crate) fn rest(t: f64, q: &DVector<f64>) -> Self {
         let zero = DVector::zeros(q.len());
         Self { t, q: q.clone(), v: zero.clone(), before: zero.clone(), after: zero }
+    }
+
+    /// The quintic over time from this knot to a later one at `t` seconds after it, with the jerks.
+    fn towards(&self, next: &Self, t: f64) -> (JointJet, DVector<f64>) {
+        let from = JointJet { q: self.q.clone(), d: self.v.clone(), dd: self.after.clone() };
+        let to = JointJet { q: next.q.clone(), d: next.v.clone(), dd: next.before.clone() };
+        between(&from, &to, next.t - self.t, t)
     }
 }
 
@@ -121,6 +137,8 @@ impl<'r> Schedule<'r> {
                 options.rise_s
             )));
         }
+        // Bounds at the stations, and the law that is fastest within them: of averaged speed, or
+        // with bounded jerks of the joints.
         let rise = arm.has_jerk_limits().then_some(options.rise_s);
         let mut limits = Limits::new(route, arm, rise);
         let LimitedPath { points, programmed, caps } = limits.at_stations();
@@ -141,6 +159,7 @@ impl<'r> Schedule<'r> {
             }
             error @ LawError::Points(_) => fail(error.to_string()),
         })?;
+        // Durations that the program gives slow the law as a whole.
         let mut schedule = Self { route, law: law.0, stretch: law.1, programmed, caps };
         schedule.stretch *= schedule.given_duration(&fail)?;
         Ok(schedule)
@@ -222,6 +241,7 @@ impl<'r> Schedule<'r> {
             .iter()
             .map(|piece| (self.time_of(stations[piece.stations[1]].s), piece.stations[1]))
             .collect();
+        // Times of the knots of the law and of the seams; a knot at a seam has two accelerations.
         let end = self.duration();
         let mut times = self.knot_times(&seams, end);
         times.push((end, None));
@@ -274,10 +294,8 @@ impl<'r> Schedule<'r> {
 
     /// Whether one quintic over time follows the path between two knots.
     fn fits(&self, a: &Knot, b: &Knot) -> bool {
-        let from = JointJet { q: a.q.clone(), d: a.v.clone(), dd: a.after.clone() };
-        let to = JointJet { q: b.q.clone(), d: b.v.clone(), dd: b.before.clone() };
         let h = b.t - a.t;
-        let at = |part: &f64| between(&from, &to, h, part * h);
+        let at = |part: &f64| a.towards(b, part * h);
         let near = |part: &f64| (&at(part).0.q - &self.knot(a.t + part * h).q).amax() <= KEPT;
         [0.5, 0.25, 0.75, 0.1, 0.9].iter().all(near)
             && (!self.bounds_jerks() || JERKS_AT.iter().all(|part| self.keeps_jerk(a.t + part * h, &at(part).1)))
@@ -298,10 +316,7 @@ impl<'r> Schedule<'r> {
         if depth == 0 || b.t - a.t < 4.0 * SAME_TIME {
             return;
         }
-        let from = JointJet { q: a.q.clone(), d: a.v.clone(), dd: a.after.clone() };
-        let to = JointJet { q: b.q.clone(), d: b.v.clone(), dd: b.before.clone() };
-        let guess = between(&from, &to, b.t - a.t, middle - a.t).0;
-        let truth = self.knot(middle);
+        let (guess, truth) = (a.towards(b, middle - a.t).0, self.knot(middle));
         if (&guess.q - &truth.q).amax() <= KEPT && (!self.bounds_jerks() || self.fits(a, b)) {
             return;
         }
@@ -358,13 +373,14 @@ impl<'r> Schedule<'r> {
         let route = self.route;
         let span = self.span(leg, by_leg);
         let of = &route.legs[leg].of;
-        // The blend, if the blends leave nothing of the leg.
+        // The piece of the leg, or its blend if the blends leave nothing of it.
         let own = by_leg[leg][0].or(by_leg[leg][1]).map(|k| &route.pieces[k]);
         let (mut top, mut slowed): (Option<f64>, Option<Slowed>) = (None, None);
         let least_sigma = own.and_then(|piece| piece.least_sigma);
         if self.bounds_jerks() {
             slowed = self.slowest(leg, by_leg).map(|slow| Slowed { time_s: now + slow.time_s, ..slow });
         }
+        // Top speed of the tool, and the station that a limit slows most.
         for (tool, k) in own.iter().flat_map(|piece| piece.tool.iter().zip(piece.stations[0]..)) {
             let t = self.time_of_station(k);
             let speed = tool.V.fixed_rows::<3>(0).norm() * self.progress(t)[1];
@@ -406,6 +422,7 @@ impl<'r> Schedule<'r> {
     /// Joint whose jerk makes a station slower than its neighbours.
     fn least_by_jerk(&self, k: usize) -> Option<SlowedBy> {
         let Timing::Bounded(bounded) = &self.law else { return None };
+        // The speed has a minimum here, and a jerk near its bound acts around it.
         let [before, t, after] = [k - 1, k, k + 1].map(|k| self.time_of_station(k));
         let [left, v, right] = [before, t, after].map(|t| self.progress(t)[1]);
         if v > left.min(right) {

@@ -1,11 +1,13 @@
-//! Conversion between program targets and joint values.
+//! Conversion between program targets and joint values: [`target_joints`] and, back, [`target_at`].
+//!
+//! Both are for programs whose targets are changed, such as those of a compensation. Not here: the
+//! joints between the targets ([`crate::plan`]).
 
-use flexarm_kinematics::{AnalyticArm, Data, Frame, forward_kinematics, kuka_turn};
+use flexarm_kinematics::{AnalyticArm, Data, Selection, forward_kinematics, kuka_turn};
 use flexarm_settings::Finding;
-use flexarm_spatial::Pose;
 use nalgebra::DVector;
 
-use crate::arm::{PathOptions, ProgramArm};
+use crate::arm::{PathOptions, ProgramArm, base_of, tool_of};
 use crate::legs::{Legs, Start, spline_group};
 use crate::program::{Configuration, Item, Move, MoveKind, Program, Target};
 
@@ -23,6 +25,7 @@ pub fn target_joints(
     let mut legs = Legs::new(arm, options, None);
     let mut start = Start::of(program, arm)?;
     let mut found = vec![None; items.len()];
+    // Item by item, as a plan does; a spline has several items.
     let mut k = 0;
     while k < items.len() {
         let Item::Move(of) = &items[k] else {
@@ -51,17 +54,6 @@ pub fn target_joints(
     Ok(found)
 }
 
-/// Frame of the tool of a move on the flange of the rigid arm.
-pub fn tool_of(arm: &ProgramArm<'_>, of: &Move) -> Frame {
-    let X_FT = of.X_FT.unwrap_or(arm.X_FT);
-    Frame { X_BF: arm.flange.X_BF * X_FT, ..arm.flange.clone() }
-}
-
-/// Pose of the base of a move in the world of the model, `X_MB`.
-pub fn base_of(arm: &ProgramArm<'_>, of: &Move) -> Pose {
-    arm.X_MW * of.X_WB
-}
-
 /// Returns the target of a move that ends at the given joint values, in the form of the old one:
 /// axis values, or a pose with its branch.
 pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
@@ -70,23 +62,27 @@ pub fn target_at(arm: &ProgramArm<'_>, of: &Move, q: &DVector<f64>) -> Target {
         values.truncate(old.len());
         return Target::Joints(values);
     }
+    // Pose of the tool in the base of the move.
     let frame = tool_of(arm, of);
     let mut data = Data::new(arm.model);
     forward_kinematics(arm.model, &mut data, q);
     let X_BT = base_of(arm, of).inverse() * data.X_WF(&frame);
+    // The branch in the words of the old target.
     let Target::Pose { configuration, .. } = &of.to else { return of.to.clone() };
     let configuration = match (configuration, AnalyticArm::new(arm.model, &frame)) {
-        (Configuration::Kuka { status, turn }, Ok(analytic)) => {
+        (Configuration::Selected(Selection::Kuka { status, turn }), Ok(analytic)) => {
             let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
             // Other bits of the old word do not concern the branch and are kept.
             let found = analytic.kuka_status(&six, &counted);
             let status = status.map(|old| found.map_or(old, |found| old & !7 | found));
-            Configuration::Kuka { status, turn: turn.map(|old| old & !63 | kuka_turn(&six, &counted)) }
+            let turn = turn.map(|old| old & !63 | kuka_turn(&six, &counted));
+            Configuration::Selected(Selection::Kuka { status, turn })
         }
-        (Configuration::Abb { .. }, Ok(analytic)) => {
+        (Configuration::Selected(Selection::Abb { .. }), Ok(analytic)) => {
             let (counted, six) = (arm.controller_axes(*analytic.joints()), analytic.joints().map(|k| q[k]));
             let found = analytic.abb_configuration(&six, &counted);
-            found.map_or(configuration.clone(), |(quadrants, cfx)| Configuration::Abb { quadrants, cfx })
+            let selected = |(quadrants, cfx)| Configuration::Selected(Selection::Abb { quadrants, cfx });
+            found.map_or(configuration.clone(), selected)
         }
         (Configuration::Near(_), _) => Configuration::Near(arm.axis_values(q)),
         (other, _) => other.clone(),

@@ -1,7 +1,8 @@
 //! Joints that follow a curve of the tool.
 
 use flexarm_kinematics::{Data, Frame, Model, forward_kinematics};
-use flexarm_path::{Follower, FrameCurve, ToolCurve};
+use flexarm_path::ToolCurve;
+use flexarm_path::internals::{Follower, FrameCurve};
 use flexarm_spatial::Pose;
 use flexarm_testkit::reference_arm;
 use nalgebra::{DVector, Rotation3, Translation3, Vector3};

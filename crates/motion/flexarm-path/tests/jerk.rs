@@ -4,8 +4,8 @@
 
 use std::path::Path;
 
-use flexarm_path::jerk_law::{JerkBound, PathBounds, QuinticLaw, least_time_with_jerks};
-use flexarm_path::time_law::{Bound, Law, PathPoint, least_time};
+use flexarm_trajectory::jerk_law::{JerkBound, PathBounds, QuinticLaw, least_time_with_jerks};
+use flexarm_trajectory::time_law::{Bound, Law, PathPoint, least_time};
 use serde_json::Value;
 
 fn golden(name: &str) -> Vec<Value> {

@@ -5,7 +5,7 @@ use flexarm_kinematics::{
     AnalyticArm, ControllerAxes, Data, IkOptions, Joint, JointKind, Link, Mechanism, Model, NullSpaceRule,
     forward_kinematics, frame_jacobian, inverse_kinematics_with_rule, kuka_turn,
 };
-use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Speed, Target};
+use flexarm_path::program::{Blend, Configuration, Item, Move, MoveKind, Program, Selection, Speed, Target};
 use flexarm_path::{
     BLOCKED, ControllerAxis, JointBounds, PathOptions, Planned, ProgramArm, SlowedBy, plan, target_at, target_joints,
 };
@@ -85,7 +85,7 @@ fn joints(q: &[f64]) -> Item {
 }
 
 fn pose(X: Pose) -> Target {
-    Target::Pose { X_BT: X, configuration: Configuration::Nearest }
+    Target::Pose { X_BT: X, configuration: Configuration::NEAREST }
 }
 
 fn feed(v: f64) -> Speed {
@@ -627,7 +627,10 @@ fn an_arm_with_other_zeros_and_senses_runs_a_program_as_the_arm_whose_joints_are
     let status = analytic.kuka_status(&target, &ControllerAxes::SAME);
     assert!(status.is_some());
     let turn = Some(kuka_turn(&target, &ControllerAxes::SAME));
-    let by_words = Target::Pose { X_BT: pose_at(&target), configuration: Configuration::Kuka { status, turn } };
+    let by_words = Target::Pose {
+        X_BT: pose_at(&target),
+        configuration: Configuration::Selected(Selection::Kuka { status, turn }),
+    };
     let beside = shifted(&pose_at(&axes), [0.0, 0.2, -0.1]);
     let near = Target::Pose { X_BT: pose_at(&target), configuration: Configuration::Near(target.to_vec()) };
     let items = vec![

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_path::time_law::{Bound, Law, PathPoint, least_time};
+use flexarm_trajectory::time_law::{Bound, Law, PathPoint, least_time};
 use serde_json::Value;
 
 fn numbers(value: &Value) -> Vec<f64> {

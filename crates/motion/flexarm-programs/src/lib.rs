@@ -14,7 +14,7 @@
 //!
 //! let program = read_program("square.src".as_ref(), text, &ReadOptions::default())?;
 //! let Item::Move(last) = &program.items[2] else { panic!() };
-//! assert_eq!((last.place.to_string().as_str(), last.statement.as_str()), ("square.src:5", "LIN {Y 100}"));
+//! assert_eq!((last.place.to_string().as_str(), last.statement.as_str()), ("square.src:5:1", "LIN {Y 100}"));
 //! assert!(matches!(last.kind, MoveKind::Line));
 //! assert_eq!(last.speed.linear_m_s, Some(0.25));
 //! # Ok::<(), flexarm_programs::ProgramError>(())

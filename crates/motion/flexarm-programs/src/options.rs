@@ -1,4 +1,8 @@
 //! Options of a reader.
+//!
+//! They state what a program does not say: where it begins, values of the controller, files beside
+//! it, the kinematics of the robot. Units: m and rad, except the texts of `given`, which are in the
+//! language.
 
 use std::path::PathBuf;
 

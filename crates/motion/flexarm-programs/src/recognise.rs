@@ -1,4 +1,8 @@
 //! Recognition of the language from the content of a file; its extension decides ambiguous cases.
+//!
+//! Start at [`recognise`]: each language counts the lines that look like its own; the extension of
+//! the file decides between counts that are close. Not here: motion files that are not programs
+//! (`flexarm-run`).
 
 use crate::{Language, decode};
 

@@ -3,12 +3,13 @@
 //!
 //! Start at [`read_program_text`]. A target can be replaced if it is a literal (`{X 1000, ...}`,
 //! `[[1000, ...], ...]`), in the statement or assigned to a variable that it names; a computed,
-//! relative or indexed target has no literal of its own.
+//! relative or indexed target has no literal of its own. Numbers are written in mm and degrees with
+//! the digits of [`DIGITS`]. Not here: computation of the targets.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use flexarm_path::program::{Configuration, Program};
+use flexarm_path::program::{Configuration, Program, Selection};
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
 
@@ -169,6 +170,8 @@ impl ProgramText {
     }
 
     fn literal(&self, source: Span, target: &NewTarget) -> Result<Edits, &'static str> {
+        // KRL has records of named numbers, RAPID lists of lists: place, orientation,
+        // configuration.
         let literal = self.parsed(source)?;
         let mut edits = Edits::new();
         match (&literal.kind, target) {
@@ -190,7 +193,7 @@ impl ProgramText {
                 for (k, (name, value)) in names.iter().zip(mm_deg_zyx(X_BT)).enumerate() {
                     put_field(&mut edits, &literal, fields, name, value, DIGITS[usize::from(k > 2)], true)?;
                 }
-                if let Configuration::Kuka { status, turn } = configuration {
+                if let Configuration::Selected(Selection::Kuka { status, turn }) = configuration {
                     for (name, bits) in [("s", status), ("t", turn)] {
                         if let Some(bits) = bits {
                             put_field(&mut edits, &literal, fields, name, f64::from(*bits), 0, false)?;
@@ -210,7 +213,7 @@ impl ProgramText {
                 let place = X_BT.translation.vector * 1e3;
                 put_list(&mut edits, parts.first(), place.as_slice(), DIGITS[0])?;
                 put_list(&mut edits, parts.get(1), &quaternion(&X_BT.rotation), DIGITS[2])?;
-                if let Configuration::Abb { quadrants: [a, b, c], cfx } = configuration {
+                if let Configuration::Selected(Selection::Abb { quadrants: [a, b, c], cfx }) = configuration {
                     put_list(&mut edits, parts.get(2), &[*a, *b, *c, *cfx].map(f64::from), 0)?;
                 }
             }

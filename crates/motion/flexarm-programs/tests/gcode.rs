@@ -167,7 +167,7 @@ fn what_is_assumed_is_told() {
         "neither G20 nor G21 is there: lengths are in mm",
         "neither G61 nor G64 is there",
         "no place of the work frame (G54) was given",
-        "n.nc:2: X is not given before this move: 0 of the work frame is taken",
+        "n.nc:2:1: X is not given before this move: 0 of the work frame is taken",
         "the program ends without M2 or M30",
     ] {
         assert!(notes.iter().any(|note| note.contains(expected)), "{expected} is not in {notes:?}");

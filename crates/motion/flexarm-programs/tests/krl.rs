@@ -3,7 +3,7 @@
 
 use crate::common::{assert_pose, at_mm, euler_product, joints_deg, moves, pose, read, read_text};
 use approx::assert_relative_eq;
-use flexarm_path::program::{Blend, Configuration, Item, MoveKind, Target};
+use flexarm_path::program::{Blend, Configuration, Item, MoveKind, Selection, Target};
 use flexarm_programs::ReadOptions;
 use flexarm_spatial::Pose;
 use nalgebra::{Rotation3, Vector3};
@@ -31,7 +31,7 @@ fn inline_forms_of_a_pendant_take_speed_frames_and_blends_from_the_data_list() {
     // 60 % of half the path
     assert_eq!(ptp.blend, Blend::Fraction(0.3));
     let Target::Pose { configuration, .. } = &ptp.to else { panic!() };
-    assert_eq!(*configuration, Configuration::Kuka { status: Some(2), turn: Some(35) });
+    assert_eq!(*configuration, Configuration::Selected(Selection::Kuka { status: Some(2), turn: Some(35) }));
 
     assert_eq!((lin.speed.linear_m_s, lin.kind.clone()), (Some(0.4), MoveKind::Line));
     assert_relative_eq!(lin.speed.linear_m_s2.unwrap(), 0.5 * 2.3, max_relative = 1e-15);

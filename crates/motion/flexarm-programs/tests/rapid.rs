@@ -3,7 +3,7 @@
 
 use crate::common::{assert_pose, at_mm, euler_product, joints_deg, moves, pose, read, read_text};
 use approx::assert_relative_eq;
-use flexarm_path::program::{Blend, Configuration, Item, MoveKind, Target};
+use flexarm_path::program::{Blend, Configuration, Item, MoveKind, Selection, Target};
 use flexarm_programs::ReadOptions;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
@@ -38,7 +38,7 @@ fn targets_tools_and_work_objects_are_poses_of_their_quaternions() {
     // User frame rotated by 90 degrees about z; the object frame's (0, 50) is (-50, 0) there.
     assert_pose(&moves[1].X_WB, &at_mm(950.0, 0.0, 20.0, euler_product(90.0, 0.0, 0.0)));
     let Target::Pose { configuration, .. } = &moves[1].to else { panic!() };
-    assert_eq!(*configuration, Configuration::Abb { quadrants: [0, -1, 2], cfx: 1 });
+    assert_eq!(*configuration, Configuration::Selected(Selection::Abb { quadrants: [0, -1, 2], cfx: 1 }));
     assert_pose(&pose(moves[2]), &at_mm(610.0, 100.0, 670.0, R)); // Offs is in the object frame
     // RelTool \Rz:=90 at 12 mm along the tool
     assert_pose(&pose(moves[7]), &at_mm(600.0, 0.0, 712.0, euler_product(90.0, 0.0, 0.0)));
@@ -128,7 +128,7 @@ fn settings_of_the_program_change_the_moves_behind_them() {
     let program = read_text("m.mod", text, &ReadOptions::default()).unwrap();
     let moves = moves(&program);
     let Target::Pose { configuration, .. } = &moves[0].to else { panic!() };
-    assert_eq!(*configuration, Configuration::Nearest);
+    assert_eq!(*configuration, Configuration::NEAREST);
     assert_eq!(moves[0].speed.linear_m_s2, Some(2.0));
     assert_pose(&moves[1].X_WB, &at_mm(0.0, 0.0, 100.0, Rotation3::identity()));
     let MoveKind::Arc { via_rotation, turns_with_path, .. } = &moves[1].kind else { panic!() };

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use flexarm_path::program::{Configuration, Item, Move, Target};
+use flexarm_path::program::{Configuration, Item, Move, Selection, Target};
 use flexarm_programs::{NewTarget, ProgramText, ReadOptions, Rewritten, read_program, read_program_text};
 use flexarm_spatial::Pose;
 use nalgebra::{Rotation3, Translation3, Vector3};
@@ -47,8 +47,8 @@ fn all(text: &ProgramText) -> Vec<(usize, NewTarget, Option<Vector3<f64>>)> {
             Target::Joints(values) => NewTarget::Joints(values.iter().map(|v| v + 0.01).collect()),
             Target::Pose { .. } => {
                 let configuration = match text.language.name() {
-                    "KUKA KRL" => Configuration::Kuka { status: Some(2), turn: Some(35) },
-                    _ => Configuration::Abb { quadrants: [-1, 0, 1], cfx: 2 },
+                    "KUKA KRL" => Configuration::Selected(Selection::Kuka { status: Some(2), turn: Some(35) }),
+                    _ => Configuration::Selected(Selection::Abb { quadrants: [-1, 0, 1], cfx: 2 }),
                 };
                 NewTarget::Pose { X_BT: pose(k), configuration }
             }
@@ -127,7 +127,7 @@ fn robtargets_and_jointtargets_are_replaced_and_shared_ones_only_if_all_agree() 
     let NewTarget::Pose { X_BT, .. } = one else { panic!() };
     let Target::Pose { X_BT: found, configuration } = &moves(&new)[3].to else { panic!() };
     assert!((found.translation.vector - X_BT.translation.vector).norm() < 1e-7);
-    assert_eq!(*configuration, Configuration::Abb { quadrants: [-1, 0, 1], cfx: 2 });
+    assert_eq!(*configuration, Configuration::Selected(Selection::Abb { quadrants: [-1, 0, 1], cfx: 2 }));
     // The target is unchanged for both moves if they request different values.
     let torn = old.rewritten(&all(&old), "compensated");
     assert_eq!(torn.replaced, [0]);

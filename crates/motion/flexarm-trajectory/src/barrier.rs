@@ -1,5 +1,15 @@
 //! Interior-point method for the convex programs of [`crate::jerk_law`]: minimises the travel time
 //! of a cubic spline within its bounds.
+//!
+//! ```text
+//! minimise  T(c) = Σ w_g y(θ_g)^(-1/2)      y(θ) = Σ c_i B_i(θ)      w_g: Gauss weights, s     (1)
+//! within    f c < 1                         linear bounds                                     (2)
+//!           |f c| < y^(-1/2)                bounds of the jerk, e c = y                        (3)
+//! ```
+//! For falling `mu`, Newton's method minimises `T - mu Σ ln(slack)`; four neighbouring coefficients
+//! occur in each term, so that the Hessian has three superdiagonals and a step costs O(n).
+//!
+//! Start at [`improved`]. Not here: what the bounds mean ([`crate::jerk_law`]).
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
 use crate::jerk_law::{PathBounds, QuinticLaw};
@@ -225,10 +235,12 @@ impl Problem {
                 }
             }
         };
+        // (1): dT = -T/(2 y) e, d²T = 3 T/(4 y²) e eᵀ.
         for time in &self.times {
             let (t, y) = (time.at(c), dot(&time.e, &c[time.i..]));
             add(time.i, &time.e, -0.5 * t / y, 0.75 * t / (y * y));
         }
+        // (2) and (3): -mu ln(slack), both signs of (3).
         for bound in &self.linear {
             let slack = 1.0 - dot(&bound.f, &c[bound.i..]);
             add(bound.i, &bound.f, mu / slack, mu / (slack * slack));
@@ -255,10 +267,12 @@ impl Problem {
             for _ in 0..STEPS {
                 self.derivatives(c, mu, &mut g, &mut H);
                 let Some(step) = solve(&mut H, &g) else { break };
+                // Newton decrement: the fall of the barrier function to first order.
                 let gain: f64 = g.iter().zip(&step).map(|(g, d)| g * d).sum();
                 if gain < CENTRED * mu {
                     break;
                 }
+                // Longest step among 1, 1/2, 1/4, ... that decreases the function enough.
                 let found = (0..HALVINGS).find_map(|k| {
                     let part = 0.5f64.powi(k as i32);
                     trial.iter_mut().zip(c.iter().zip(&step)).for_each(|(trial, (c, d))| *trial = c - part * d);
@@ -305,6 +319,7 @@ impl Logs {
 /// Solves a positive definite system and replaces the matrix by its factors; `None` if it is not
 /// positive definite.
 fn solve(H: &mut Banded, g: &[f64]) -> Option<Vec<f64>> {
+    // H = Lᵀ D L, with row k of L right of the diagonal; forward substitution goes along.
     let n = g.len();
     let mut x = g.to_vec();
     for k in 0..n {
@@ -321,6 +336,7 @@ fn solve(H: &mut Banded, g: &[f64]) -> Option<Vec<f64>> {
         }
         H[k] = [d, row[0], row[1], row[2]];
     }
+    // Division by D and back substitution.
     for k in (0..n).rev() {
         x[k] /= H[k][0];
         for i in 1..4.min(n - k) {

@@ -8,7 +8,7 @@ use crate::error::TrajectoryError;
 use crate::trajectory::Trajectory;
 
 /// Maximum number of rows; more means a wrong rate.
-const MAX_ROWS: f64 = 1e8;
+const MAX_ROWS: u32 = 100_000_000;
 
 impl Trajectory {
     /// Writes positions, velocities and accelerations in SI units: one row every `1 / rate_hz` s
@@ -18,11 +18,7 @@ impl Trajectory {
     /// # Errors
     /// [`TrajectoryError::Value`] or [`TrajectoryError::Write`].
     pub fn to_csv(&self, rate_hz: f64, mut out: impl Write) -> Result<(), TrajectoryError> {
-        let duration_s = self.duration();
-        let intervals = duration_s * rate_hz;
-        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_ROWS) {
-            return Err(TrajectoryError::rate(rate_hz, duration_s));
-        }
+        let times = self.row_times(rate_hz, MAX_ROWS)?;
         writeln!(out, "# unit: rad")?;
         writeln!(out, "# time: s")?;
         let mut header = vec!["time".to_owned()];
@@ -33,10 +29,7 @@ impl Trajectory {
 
         let n = self.joints().len();
         let (mut q, mut qdot, mut qddot) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        // The row at the end replaces the last regular row where they coincide.
-        let regular = (intervals - 1e-6).ceil().max(1.0) as usize;
-        for k in 0..=regular {
-            let t = if k == regular { duration_s } else { k as f64 / rate_hz };
+        for t in times {
             self.sample(t, &mut q, &mut qdot, &mut qddot);
             write!(out, "{}", number(t))?;
             for value in q.iter().chain(&qdot).chain(&qddot) {

@@ -1,4 +1,9 @@
 //! The curve of one joint as a piecewise polynomial: values, jumps and kinks.
+//!
+//! A [`Curve`] has n pieces between n + 1 knots, times in s from the start of the motion; positions
+//! are in rad or m. Before the first knot and after the last one the joint is at rest, so that a
+//! motion that starts at speed has a jump there. Not here: polynomials (`polynomial`), building of
+//! curves (`spline`, `plan`).
 
 use crate::polynomial::Piece;
 

@@ -1,12 +1,17 @@
 //! Reads a trajectory from a path; the file extension selects the reader.
+//!
+//! Texts may be in UTF-8, UTF-16 or Windows-1252. Not here: recognition of formats by their
+//! content, which `flexarm-run` does for all formats of motions.
 
 use std::fs::File;
 use std::io::{Error, ErrorKind, Read};
 use std::path::Path;
 
+use flexarm_settings::Place;
+
 use crate::error::TrajectoryError;
+use crate::findings::{at, not_utf8};
 use crate::limits::JointLimits;
-use crate::problem::Problem;
 use crate::trajectory::Trajectory;
 
 /// Maximum file size (bytes); an hour of six joints at 1 kHz takes a third of it.
@@ -88,7 +93,7 @@ pub fn text_of_bytes(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryE
     };
     let words = bytes[2..].chunks_exact(2).map(|pair| word([pair[0], pair[1]]));
     let text: Result<String, _> = char::decode_utf16(words).collect();
-    text.map_err(|_| Problem::not_utf8().at(origin, None, None))
+    text.map_err(|_| at(&Place::of_file(origin), not_utf8()).into())
 }
 
 /// Decodes Windows-1252 text without control characters; `None` if the bytes are UTF-8, have
@@ -110,6 +115,6 @@ fn text_of(bytes: Vec<u8>, origin: &str) -> Result<String, TrajectoryError> {
     String::from_utf8(bytes).map_err(|error| {
         let good = &error.as_bytes()[..error.utf8_error().valid_up_to()];
         let line = 1 + good.iter().filter(|&&byte| byte == b'\n').count();
-        Problem::not_utf8().at(origin, Some(line), None)
+        at(&Place::of_file(origin).line(line), not_utf8()).into()
     })
 }

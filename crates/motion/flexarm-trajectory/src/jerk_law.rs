@@ -53,7 +53,7 @@ impl PathBounds {
     /// Tightens the bounds for a run that passes them by the given factors of speed: `linear` for
     /// the bounds without jerk, `jerk` for those of jerk.
     #[must_use]
-    pub fn drawn_in(mut self, [linear, jerk]: [f64; 2]) -> Self {
+    fn drawn_in(mut self, [linear, jerk]: [f64; 2]) -> Self {
         let (second, third) = (linear * linear, jerk.powi(3));
         self.x_max /= second;
         for bound in &mut self.bounds {
@@ -69,7 +69,8 @@ impl PathBounds {
     /// With `a = l a_m` and `|a_m u + b_m x| <= 1`, `x <= X`: `|a u + b x| <= |l| + |b - l b_m| X`;
     /// likewise for jerks.
     #[must_use]
-    pub fn pruned(mut self) -> Self {
+    pub(crate) fn pruned(mut self) -> Self {
+        // Bounds without jerk, by the one with the largest factor of u.
         let X = self.x_max;
         let even = |bound: &Bound| bound.low == -bound.high;
         let strength = |bound: &Bound| (bound.a / bound.high).abs();
@@ -81,6 +82,7 @@ impl PathBounds {
             let l = a / a_m;
             *bound == m || !even(bound) || l.abs() + (b - l * b_m).abs() * X > 1.0
         });
+        // Bounds of the jerk likewise, with the largest |u| that the bound above allows.
         let U = (1.0 + b_m.abs() * X) / a_m.abs();
         let strength = |bound: &JerkBound| (bound.a / bound.most).abs();
         let strongest = self.jerks.iter().copied().max_by(|a, b| strength(a).total_cmp(&strength(b)));
@@ -142,6 +144,7 @@ pub fn least_time_with_jerks(
     rise: f64,
     place: &mut dyn FnMut(usize, f64) -> PathBounds,
 ) -> QuinticLaw {
+    // Rounds with ever finer intervals, each from the law of the one before.
     let step = |duration: f64| (rise / OF_RISE).min(duration / MIN).max(duration / MAX);
     let mut law = QuinticLaw::along(law, stations, ROUNDS[0].0 * step(law.duration()));
     for (round, gap) in ROUNDS {
@@ -162,6 +165,7 @@ pub fn least_time_with_jerks(
         }
         law = law.improved(DRAWN_GAP, &mut |k, s| place(of[k], s).drawn_in(drawn[k]));
     }
+    // What is left of the violation, by slowing the whole motion.
     let slowing = law.slowing(&mut |k, s| place(of[k], s));
     law.slowed(slowing.iter().flatten().fold(1.0, |most: f64, slowing| most.max(*slowing)))
 }
@@ -191,10 +195,13 @@ pub struct QuinticLaw {
 }
 
 impl QuinticLaw {
-    /// Samples a law at the stations of its path and at times about `step` apart.
+    /// Samples a law at the stations of its path and at times about `step` seconds apart, none of
+    /// which is nearer than `0.3 step` to that of a station.
     pub fn along(law: &Law, stations: &[f64], step: f64) -> Self {
+        // Times of the stations between start and end, with their numbers.
         let (end, last) = (law.duration(), stations.len() - 1);
         let mut times: Vec<(f64, Option<usize>)> = (1..last).map(|k| (time_of(law, stations[k]), Some(k))).collect();
+        // Even times that are not near a station.
         let count = (end / step).ceil() as usize;
         for k in 1..count {
             let t = end * k as f64 / count as f64;
@@ -205,6 +212,7 @@ impl QuinticLaw {
             }
         }
         times.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // The law at these times, with the exact parameters of the stations, from rest to rest.
         let mut found = Self::default();
         found.push(0.0, &Progress { s: stations[0], v: 0.0, a: 0.0, j: 0.0 });
         for (t, station) in times {
@@ -228,14 +236,18 @@ impl QuinticLaw {
         self.t[self.t.len() - 1]
     }
 
-    /// State of the motion at time `t` (s).
+    /// Returns the state of the motion at time `t` (s), at the nearer end outside the motion.
     pub fn at(&self, t: f64) -> Progress {
         let last = self.t.len() - 1;
         let k = self.t.partition_point(|knot| *knot <= t).clamp(1, last) - 1;
         self.within(k, (t - self.t[k]).clamp(0.0, self.t[k + 1] - self.t[k]))
     }
 
-    /// State of the motion at time `tau` after node `k`, in the interval that begins there.
+    /// Returns the state of the motion at time `tau` (s) after node `k`, on the quintic of the
+    /// interval that begins there.
+    ///
+    /// # Panics
+    /// If `k` is the last node.
     pub fn within(&self, k: usize, tau: f64) -> Progress {
         let h = self.t[k + 1] - self.t[k];
         let (v0, v1, a0, a1) = (self.v[k], self.v[k + 1], self.a[k], self.a[k + 1]);

@@ -3,7 +3,7 @@
 
 use flexarm_settings::closest;
 
-use crate::problem::list;
+use crate::error::list;
 
 /// Text about a name close to that of a joint which the file does not name; `or` is another remedy.
 pub(crate) fn misspelt_text(found: &str, meant: &str, or: &str) -> String {

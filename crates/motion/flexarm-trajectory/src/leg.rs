@@ -3,14 +3,15 @@
 //! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` for moves through via points) times the
 //! travel of each joint.
 
+use flexarm_settings::Finding;
+
 use crate::curve::Curve;
+use crate::error::PlanError;
 use crate::optimal::JointPath;
-use crate::plan::{MotionLimits, PlannedMove, Profile};
+use crate::plan::{MotionLimits, PlannedMove, Profile, SHORT_DURATION};
 use crate::polynomial::Piece;
-use crate::problem::PlanError;
 use crate::shape::{self, Phases, ShapeLimits};
 use crate::via;
-use crate::warning::Warning;
 
 /// One move and its start.
 pub(crate) struct Leg<'a> {
@@ -187,7 +188,7 @@ impl Leg<'_> {
     }
 
     /// Acceleration and jerk limits that the given duration violates.
-    pub(crate) fn warnings(&self, curves: &[Curve]) -> Vec<Warning> {
+    pub(crate) fn warnings(&self, curves: &[Curve]) -> Vec<Finding> {
         let mut warnings = Vec::new();
         if self.planned.duration.is_none() {
             return warnings;
@@ -201,8 +202,12 @@ impl Leg<'_> {
             let checks = [("acceleration", acceleration, limits.acceleration), ("jerk", jerk, limits.jerk)];
             for (quantity, value, limit) in checks {
                 if value > limit * (1.0 + 1e-9) {
-                    let (number, joint) = (self.number, joint.clone());
-                    warnings.push(Warning::ShorterThanLimitsAllow { number, joint, quantity, value, limit });
+                    let message = format!(
+                        "move {}: the given duration takes the {quantity} of joint {joint:?} to {value:.4}, over its \
+                         limit of {limit:.4} (SI units): allow more time or drop the limit",
+                        self.number
+                    );
+                    warnings.push(Finding::warning(SHORT_DURATION, "", message, ""));
                 }
             }
         }

@@ -57,6 +57,7 @@ mod csv_write;
 mod curve;
 mod error;
 mod file;
+mod findings;
 mod gap;
 pub mod jerk_law;
 mod joint_names;
@@ -67,7 +68,6 @@ mod optimal;
 mod peak;
 mod plan;
 mod polynomial;
-mod problem;
 mod rounding;
 mod samples_toml;
 mod shape;
@@ -76,7 +76,6 @@ pub mod table;
 pub mod time_law;
 mod trajectory;
 mod via;
-mod warning;
 pub mod waypoints;
 mod waypoints_check;
 mod waypoints_toml;
@@ -84,24 +83,22 @@ mod waypoints_write;
 
 pub use column_map::{ColumnMap, ColumnMapError};
 pub use curve::LONGEST;
-pub use error::TrajectoryError;
+pub use error::{MISSING_LIMIT, PlanError, SampleError, TrajectoryError};
 pub use file::{bytes_of_file, text_of_bytes, text_of_file};
+pub use gap::Gap;
 pub use joint_names::foreign_joints;
 pub use limits::{JointLimits, LimitKind, LimitViolation};
-pub use noise::Noise;
 pub use peak::{Extreme, JointPeak};
 pub use plan::{MotionLimits, Plan, PlannedMove, Profile};
-pub use problem::{MISSING_LIMIT, PlanError, SampleError};
 pub use spline::{JointKnots, JointSamples, Samples, velocity_mismatch};
 pub use table::{KnownJoint, TableInfo, TableRequest};
 pub use trajectory::{Move, Trajectory, VelocityJump};
-pub use warning::Warning;
 
 /// Kernels, for the tests of this crate.
 #[doc(hidden)]
 pub mod internals {
     pub use crate::corner::{Corner, corners};
-    pub use crate::noise::noise;
+    pub use crate::noise::{Noise, noise};
     pub use crate::polynomial::{Few, Piece, roots_in_unit_interval};
     pub use crate::via::{passing_times, rest_to_rest_spline};
 }

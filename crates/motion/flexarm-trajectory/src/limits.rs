@@ -1,7 +1,7 @@
 //! Checks a trajectory against the limits of its joints: all violations, each with its time and
 //! size.
 
-use std::fmt;
+use flexarm_settings::Finding;
 
 use crate::curve::Curve;
 use crate::trajectory::Trajectory;
@@ -65,7 +65,7 @@ pub enum LimitKind {
     Effort,
 }
 
-/// A limit that a joint violates, with the worst value; `Display` gives one line.
+/// A limit that a joint violates, with the worst value.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LimitViolation {
     /// Joint name.
@@ -82,8 +82,9 @@ pub struct LimitViolation {
     pub limit: f64,
 }
 
-impl fmt::Display for LimitViolation {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+impl LimitViolation {
+    /// Returns the warning `joint-limit` about the violation; its location is the joint.
+    pub fn warning(&self) -> Finding {
         let (what, mend) = match self.kind {
             LimitKind::Lower => ("position falls below its lower limit", "change the waypoints"),
             LimitKind::Upper => ("position rises above its upper limit", "change the waypoints"),
@@ -93,11 +94,11 @@ impl fmt::Display for LimitViolation {
             LimitKind::Effort => ("effort exceeds its limit", "allow the move more time"),
         };
         let Self { joint, time_s, since_s, value, limit, .. } = self;
-        write!(
-            f,
+        let message = format!(
             "joint {joint:?}: {what} {limit:.4}: {value:.4} at t = {time_s:.4} s, first passed at {since_s:.4} s \
              (SI units); {mend}"
-        )
+        );
+        Finding::warning("joint-limit", joint, message, "")
     }
 }
 

@@ -7,21 +7,26 @@
 //! duration. An S-curve uses acceleration and jerk limits if both are given; otherwise each ramp
 //! takes a third of the duration, and each rise of the acceleration a third of that. If the
 //! duration is too short for these limits, the move gets the default ramps and a
-//! [`crate::Warning::ShorterThanLimitsAllow`].
+//! warning with the code [`SHORT_DURATION`].
 //!
 //! **No duration**: the move is as fast as the limits allow. If synchronised, all joints follow one
 //! common shape (a straight line in joint space) under the strictest limits; otherwise each joint
 //! has its own shape and the slowest joint determines the duration.
 
+use flexarm_settings::Finding;
+
 use crate::curve::Curve;
-use crate::error::TrajectoryError;
+use crate::error::{PlanError, TrajectoryError};
 use crate::leg::Leg;
-use crate::problem::PlanError;
+
 use crate::trajectory::Trajectory;
-use crate::warning::Warning;
 
 /// Message about a plan that lasts no time.
 const STILL: &str = "nothing moves and nothing is held, so the trajectory lasts 0 s; add a move or a hold";
+
+/// Code of the warning about a given duration that takes a joint over an acceleration or jerk
+/// limit.
+pub(crate) const SHORT_DURATION: &str = "short-duration";
 
 /// Velocity profile of a move.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,19 +61,25 @@ impl MotionLimits {
     /// No limits.
     pub const UNLIMITED: Self = Self { velocity: f64::INFINITY, acceleration: f64::INFINITY, jerk: f64::INFINITY };
 
-    /// Returns the first limit that does not suit the others, as one in another unit.
+    /// Returns a warning about the first limit that does not suit the others, as one in another
+    /// unit.
     ///
     /// * `own`: maximum speed of the robot's joint (rad/s or m/s).
-    pub fn odd(&self, joint: &str, own: f64) -> Option<Warning> {
+    pub fn unusual(&self, joint: &str, own: f64) -> Option<Finding> {
         let found = [
             ("its speed limit over that of the robot is", self.velocity / own, SPEED_RATIO),
             ("the time to its full speed in s is", self.velocity / self.acceleration, FULL_SPEED_S),
             ("the time to its full acceleration in s is", self.acceleration / self.jerk, FULL_ACCELERATION_S),
         ];
-        let is_odd =
+        let is_unusual =
             |value: f64, [low, high]: [f64; 2]| value.is_finite() && value > 0.0 && !(low..=high).contains(&value);
-        let (what, value, usual) = found.into_iter().find(|(_, value, usual)| is_odd(*value, *usual))?;
-        Some(Warning::OddLimit { joint: joint.to_owned(), what, value, usual })
+        let (what, value, [low, high]) = found.into_iter().find(|(_, value, usual)| is_unusual(*value, *usual))?;
+        let message = format!(
+            "limits of joint {joint:?}: {what} {value:.2e}, usual are {low} to {high}: are speed, acceleration and jerk \
+             in the unit of the file (deg or rad)?"
+        );
+        let yardstick = if value < low { low } else { high };
+        Some(Finding::warning("motion-limits", joint, message, "").measured(value, yardstick))
     }
 }
 
@@ -102,7 +113,8 @@ pub struct PlannedMove {
 }
 
 impl PlannedMove {
-    /// A quintic move to the goal within `duration` seconds, without limits, via points or hold.
+    /// Returns a quintic move to the goal `to` (rad or m, one value per joint) within `duration`
+    /// seconds, without limits, via points or hold.
     pub fn quintic(to: Vec<f64>, duration: f64) -> Self {
         let limits = vec![MotionLimits::UNLIMITED; to.len()];
         let (via, duration, profile) = (Vec::new(), Some(duration), Profile::Quintic);
@@ -169,6 +181,7 @@ impl Plan {
             false => Err(bad_number(what, number, value, allowed)),
         };
 
+        // The start, then each move: lengths first, then values.
         if n == 0 {
             return Err(PlanError::of_move(0, "the plan has no joints; name at least one"));
         }

@@ -5,7 +5,7 @@
 //! ```
 //! Start at [`Piece::hermite`]; everything else evaluates. Extrema come from the real roots of the
 //! next derivative, isolated between the roots of the derivative after that: there is no sampling,
-//! and none is missed.
+//! and none is missed. Values are in rad or m. Not here: sequences of pieces (`curve`).
 
 use std::ops::Deref;
 
@@ -30,7 +30,9 @@ impl Piece {
         Self { width, c: [q, 0.0, 0.0, 0.0, 0.0, 0.0] }
     }
 
-    /// The quintic with position, velocity and acceleration given at both ends.
+    /// Returns the quintic with position, velocity and acceleration (rad or m, s) at both ends.
+    ///
+    /// * `width`: s, positive.
     pub fn hermite(width: f64, [q0, v0, a0]: [f64; 3], [q1, v1, a1]: [f64; 3]) -> Self {
         let h = width;
         let step = q1 - q0;
@@ -40,7 +42,7 @@ impl Piece {
         Self { width, c: [q0, v0, a0 / 2.0, c3, c4, c5] }
     }
 
-    /// Position, velocity, acceleration and jerk at `tau`.
+    /// Returns position, velocity, acceleration and jerk at `tau` (s).
     pub fn at(&self, tau: f64) -> [f64; 4] {
         let [c0, c1, c2, c3, c4, c5] = self.c;
         [
@@ -80,7 +82,12 @@ impl Piece {
         (1..6).map(|k| self.c[k].abs() * self.width.powi(k as i32)).sum()
     }
 
-    /// Minimum and maximum of derivative `order` (0 position ... 3 jerk), exact up to rounding.
+    /// Returns minimum and maximum of derivative `order`, exact up to rounding.
+    ///
+    /// * `order`: 0 position, 1 velocity, 2 acceleration, 3 jerk.
+    ///
+    /// # Panics
+    /// If `order` is greater than 3.
     pub fn range(&self, order: usize) -> Range {
         let value = |u: f64| self.at(u * self.width)[order];
         let (mut least, mut greatest) = ((0.0, value(0.0)), (0.0, value(0.0)));

@@ -24,7 +24,7 @@ impl Trajectory {
             return Err(TrajectoryError::Value(format!("corners cannot be rounded within {seconds} s; {mend}")));
         }
         let curves = self.curves().iter().map(|curve| curve.rounded(seconds)).collect();
-        Self::from_curves(self.joints().to_vec(), curves, self.duration(), self.notes().to_vec())
+        self.with_curves(self.joints().to_vec(), curves)
     }
 }
 

@@ -18,13 +18,12 @@ use serde::Deserialize;
 use toml::Spanned;
 
 use crate::error::TrajectoryError;
-use crate::problem::Problem;
 use crate::spline::{JointSamples, Samples};
 use crate::trajectory::Trajectory;
 use crate::waypoints_check::{Located, bad_value, joint_names, scales};
 
 /// Maximum number of rows written.
-const MAX_ROWS: f64 = 5e6;
+const MAX_ROWS: u32 = 5_000_000;
 
 /// The whole file.
 #[derive(Debug, Deserialize)]
@@ -59,6 +58,7 @@ pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> 
     let names = joint_names(&file.joints)?;
     let scales = scales(&file.unit, &file.metres, &names)?;
     let SamplesToml { time, position, velocity, acceleration, cutoff_hz } = file.samples.get_ref();
+    // Rows of the file to columns in SI units.
     let columns = |rows: &Spanned<Vec<Vec<f64>>>, key: &'static str| -> Result<Vec<Vec<f64>>, Located> {
         let (found, expected) = (rows.get_ref().len(), time.get_ref().len());
         if found != expected {
@@ -87,14 +87,7 @@ pub(crate) fn trajectory(file: &SamplesFileToml) -> Result<Trajectory, Located> 
         Some(hz) => samples.smoothed(*hz).map_err(Into::into).and_then(|smooth| smooth.interpolate()),
         None => samples.interpolate(),
     };
-    made.map_err(|error| {
-        let problem = match error {
-            TrajectoryError::Samples(error) => error.into(),
-            TrajectoryError::OutOfRange { joint, .. } => Problem::out_of_range(&joint),
-            other => Problem::new("toml", other.to_string()),
-        };
-        Located { offset: Some(time.span().start), problem }
-    })
+    made.map_err(|error| Located { offset: Some(time.span().start), fault: error.into() })
 }
 
 impl Trajectory {
@@ -105,17 +98,10 @@ impl Trajectory {
     /// # Errors
     /// [`TrajectoryError::Value`].
     pub fn to_samples_toml(&self, rate_hz: f64) -> Result<String, TrajectoryError> {
-        let duration_s = self.duration();
-        let intervals = duration_s * rate_hz;
-        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= MAX_ROWS) {
-            return Err(TrajectoryError::rate(rate_hz, duration_s));
-        }
         let n = self.joints().len();
         let (mut q, mut v, mut a) = (vec![0.0; n], vec![0.0; n], vec![0.0; n]);
-        let regular = (intervals - 1e-6).ceil().max(1.0) as usize;
         let (mut times, mut rows) = (Vec::new(), [String::new(), String::new(), String::new()]);
-        for k in 0..=regular {
-            let t = if k == regular { duration_s } else { k as f64 / rate_hz };
+        for t in self.row_times(rate_hz, MAX_ROWS)? {
             self.sample(t, &mut q, &mut v, &mut a);
             times.push(t);
             for (rows, values) in rows.iter_mut().zip([&q, &v, &a]) {

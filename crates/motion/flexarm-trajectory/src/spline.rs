@@ -25,15 +25,18 @@
 
 use std::borrow::Cow;
 
+use flexarm_settings::Finding;
+use flexarm_settings::finding::FindingKind;
+
 use crate::corner::{Corner, corners};
 use crate::curve::Curve;
-use crate::error::TrajectoryError;
+use crate::error::{SampleError, TrajectoryError};
+use crate::findings::RATE;
 use crate::gap::gaps;
-use crate::noise::{MAX_SHARE, noise, smoothed, without_rounding};
+use crate::noise::{MAX_SHARE, Noise, noise, smoothed, without_rounding};
 use crate::polynomial::Piece;
-use crate::problem::SampleError;
+
 use crate::trajectory::Trajectory;
-use crate::warning::Warning;
 
 /// An end with a speed below this fraction of the top speed is at rest.
 const REST_FRACTION: f64 = 0.02;
@@ -79,7 +82,7 @@ impl Samples {
     pub fn interpolate(&self) -> Result<Trajectory, TrajectoryError> {
         self.check()?;
         let knots: Vec<f64> = self.times.iter().map(|t| t - self.times[0]).collect();
-        let (curves, notes): (Vec<Curve>, Vec<Option<Warning>>) = (self.joints.iter())
+        let (curves, notes): (Vec<Curve>, Vec<Option<Finding>>) = (self.joints.iter())
             .map(|joint| {
                 let Judged { joint, note, smoothed } = joint.judged(&knots);
                 // Smoothing leaves small bends at the ends of holds, which are no corners.
@@ -88,16 +91,17 @@ impl Samples {
             })
             .unzip();
         let names = self.joints.iter().map(|joint| joint.name.clone()).collect();
-        let notes = gaps(&knots, &self.joints).into_iter().chain(notes.into_iter().flatten()).collect();
-        Trajectory::from_curves(names, curves, knots[knots.len() - 1], notes)
+        let notes = notes.into_iter().flatten().collect();
+        let made = Trajectory::from_curves(names, curves, knots[knots.len() - 1], notes)?;
+        Ok(made.with_gaps(gaps(&knots, &self.joints).into_iter().collect()))
     }
 
     /// Returns the samples with smoothed positions, which pass half the amplitude at the cut-off;
     /// velocities and accelerations follow from them. Holds are kept.
     ///
     /// # Errors
-    /// [`SampleError`] as [`Samples::interpolate`], and for a cut-off that is not between 0 and half
-    /// the sampling rate.
+    /// [`SampleError`] as [`Samples::interpolate`], and for a cut-off that is not between 0 and
+    /// half the sampling rate.
     pub fn smoothed(&self, cutoff_hz: f64) -> Result<Self, SampleError> {
         self.check()?;
         let n = self.times.len();
@@ -146,7 +150,10 @@ const DENSE: (f64, usize) = (0.1, 6);
 /// this (rad/s or m/s).
 const FOREIGN: [f64; 2] = [0.5, 0.02];
 
-/// Returns the RMS difference of velocities to the slopes between samples, and the RMS slope.
+/// Returns the RMS difference of velocities to the slopes between samples, and the RMS slope (both
+/// rad/s or m/s).
+///
+/// * `t`, `q`, `v`: times (s, increasing), positions and velocities of at least two samples.
 pub fn velocity_mismatch(t: &[f64], q: &[f64], v: &[f64]) -> [f64; 2] {
     let n = (t.len() - 1) as f64;
     let (mut slopes, mut misses) = (0.0, 0.0);
@@ -167,6 +174,24 @@ fn foreign(t: &[f64], q: &[f64], v: &[f64]) -> Option<[f64; 2]> {
     }
     let [miss, slope] = velocity_mismatch(t, q, v);
     (miss > FOREIGN[0] * slope + FOREIGN[1]).then_some([miss, slope])
+}
+
+const FOREIGN_VELOCITIES: FindingKind = FindingKind::warning(
+    "motion-velocities",
+    "the velocities of joint \"{where}\" are not those of its positions (they differ by {value} of {yardstick} {unit}) \
+     and are not used; check their sign and unit, or leave them out",
+    RATE,
+    "",
+);
+
+fn noise_warning(joint: &str, Noise { rms, share, cutoff_hz }: &Noise) -> Finding {
+    let message = format!(
+        "joint {joint:?} has noise of {rms:.1e} rad (or m) in its positions, which makes {:.0} % of its acceleration: \
+         smooth it with a cut-off in the file, such as `# cutoff: {cutoff_hz:.2} Hz` in a table or `cutoff_hz` in \
+         [samples]",
+        100.0 * share
+    );
+    Finding::warning("motion-noise", joint, message, "").measured(*share, MAX_SHARE)
 }
 
 /// Exact values of one joint at knots: nothing is estimated, no corners are searched for.
@@ -238,7 +263,7 @@ impl JointSamples {
 struct Judged<'a> {
     joint: Cow<'a, JointSamples>,
     /// Warning about velocities or noise.
-    note: Option<Warning>,
+    note: Option<Finding>,
     /// Whether positions without corners were smoothed within their rounding.
     smoothed: bool,
 }
@@ -251,7 +276,7 @@ impl JointSamples {
         if let Some(velocity) = &self.velocity {
             let Some([miss, slope]) = foreign(times, position, velocity) else { return as_given(None) };
             let bare = Self { name: joint.clone(), position: position.clone(), ..Self::default() };
-            let note = Some(Warning::ForeignVelocities { joint, miss, slope });
+            let note = Some(FOREIGN_VELOCITIES.found(joint, miss, slope));
             return Judged { joint: Cow::Owned(bare), note, smoothed: false };
         }
         let Some(noise) = noise(times, position).filter(|noise| noise.share > MAX_SHARE) else {
@@ -261,7 +286,7 @@ impl JointSamples {
             Some(position) => {
                 Judged { joint: Cow::Owned(Self { position, ..self.clone() }), note: None, smoothed: true }
             }
-            None => as_given(Some(Warning::Noise { joint, noise })),
+            None => as_given(Some(noise_warning(&joint, &noise))),
         }
     }
 }

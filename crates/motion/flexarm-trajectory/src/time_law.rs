@@ -13,6 +13,10 @@
 //!
 //! [`Law::smoothed`] is the moving average of the speed over a time T: the path stays the same,
 //! accelerations rise and fall within T, and the duration increases by T.
+//!
+//! Start at [`least_time`]; [`Law`] turns its result into a motion. Units: the parameter `s` has a
+//! unit of the caller's choice (m, rad or 1), times are in s. Not here: bounds of the jerk
+//! ([`crate::jerk_law`]), bounds of a particular arm (`flexarm-path`).
 #![allow(non_snake_case, reason = "letters of the formulas")]
 
 /// Bound `low <= a u + b x <= high`.
@@ -49,8 +53,10 @@ impl PathPoint {
         Self { s, x_max: between(here.x_max, next.x_max, part), bounds: bounds_between(here, next, part).collect() }
     }
 
-    /// Maximum ratio of a squared speed and an acceleration to the bounds between two points; at
-    /// most 1 if they keep them.
+    /// Returns the maximum ratio of a squared speed `x` and an acceleration `u` to the bounds
+    /// between two neighbouring points, at most 1 if they keep them.
+    ///
+    /// * `part`: place between the points, from 0 (`here`) to 1 (`next`).
     pub fn passed(here: &Self, next: &Self, part: f64, x: f64, u: f64) -> f64 {
         let ratio = |bound: Bound| {
             let value = bound.a * u + bound.b * x;
@@ -121,7 +127,7 @@ impl Lines {
             self.add(bound);
         }
         for bound in &next.bounds {
-            // x of the next point is x + 2 u ds.
+            // The squared speed of the next point is x + 2 u ds.
             self.add(&Bound { a: bound.a + 2.0 * ds * bound.b, ..*bound });
         }
     }
@@ -193,11 +199,16 @@ impl Lines {
     }
 }
 
-/// Returns the squared speeds of the time-optimal law at the points of a path, from `x = 0` to
-/// `x = 0`.
+/// Returns the squared speeds `x` of the time-optimal law, one per point, from `x = 0` to `x = 0`.
+///
+/// With fewer than 4000 intervals, each one is divided, and the bounds are interpolated linearly in
+/// between. The cost is that of two passes over the points with all their bounds.
 ///
 /// # Errors
-/// [`LawError`] if the points are not ascending or the bounds cannot be kept.
+/// [`LawError`] if the points are fewer than two or not ascending, or the bounds cannot be kept.
+///
+/// # Source
+/// [Pham & Pham 2018], with the bounds at both ends of each interval.
 pub fn least_time(points: &[PathPoint]) -> Result<Vec<f64>, LawError> {
     let n = points.len();
     if n < 2 {
@@ -272,7 +283,8 @@ pub struct Progress {
 }
 
 impl Law {
-    /// Builds the law with squared speeds `x` at the parameters `s`.
+    /// Builds the law with squared speeds `x` at the parameters `s`, such as those of
+    /// [`least_time`]; no two neighbouring speeds may both be zero.
     ///
     /// # Panics
     /// If `s` and `x` differ in length.
@@ -290,7 +302,8 @@ impl Law {
         Self { t, s: s.to_vec(), v, integral, window: 0.0 }
     }
 
-    /// The same path with the speed averaged over `window` seconds.
+    /// Returns the motion on the same path with the speed averaged over the last `window` seconds;
+    /// its duration is longer by `window`.
     #[must_use]
     pub fn smoothed(self, window: f64) -> Self {
         Self { window, ..self }
@@ -327,7 +340,7 @@ impl Law {
         [integral, s + tau * (v + tau * a / 2.0), v + a * tau, a]
     }
 
-    /// State of the motion at time `t` (s).
+    /// Returns the state of the motion at time `t` (s); before 0 and after the end it is at rest.
     pub fn at(&self, t: f64) -> Progress {
         let [integral, s, v, a] = self.raw(t);
         if self.window <= 0.0 {

@@ -4,12 +4,15 @@
 //! Start at [`Trajectory::sample`]. Trajectories are built by [`crate::Plan`] and
 //! [`crate::Samples`] and do not change afterwards.
 
+use flexarm_settings::{Finding, Place};
+
 use crate::curve::{Curve, LONGEST, QUIET_SPEED};
-use crate::error::TrajectoryError;
+use crate::error::{SampleError, TrajectoryError};
+use crate::findings::{at, fault, of_curve};
+use crate::gap::Gap;
+use crate::plan::SHORT_DURATION;
 use crate::polynomial::Piece;
-use crate::problem::{Problem, SampleError};
 use crate::table::request::KnownJoint;
-use crate::warning::Warning;
 
 /// A joint that moves less than this within a piece (rad or m) is at rest there.
 const REST: f64 = 1e-9;
@@ -26,8 +29,11 @@ pub struct Trajectory {
     joints: Vec<String>,
     curves: Vec<Curve>,
     duration: f64,
-    /// Notes of the reader or planner; see [`Trajectory::warnings`].
-    notes: Vec<Warning>,
+    gaps: Vec<Gap>,
+    /// Findings of the reader or planner; see [`Trajectory::warnings`].
+    notes: Vec<Finding>,
+    /// Columns of the table that are not part of the motion.
+    dropped_columns: Vec<String>,
     /// Units that the file states for its joints.
     stated: Vec<StatedUnit>,
 }
@@ -73,7 +79,7 @@ impl Trajectory {
         joints: Vec<String>,
         curves: Vec<Curve>,
         duration: f64,
-        notes: Vec<Warning>,
+        notes: Vec<Finding>,
     ) -> Result<Self, TrajectoryError> {
         assert_eq!(joints.len(), curves.len(), "one curve per joint");
         for (joint, curve) in joints.iter().zip(&curves) {
@@ -89,7 +95,8 @@ impl Trajectory {
                 return Err(TrajectoryError::OutOfRange { joint: joint.clone(), time_s: curve.knots[i] });
             }
         }
-        Ok(Self { joints, curves, duration, notes, stated: Vec::new() })
+        let (gaps, dropped_columns, stated) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { joints, curves, duration, gaps, notes, dropped_columns, stated })
     }
 
     /// Returns the stored curve of a joint, for programs that save motions: the knots (s), one more
@@ -161,6 +168,31 @@ impl Trajectory {
         }
     }
 
+    /// Returns the times of the rows of a file (s): every `1 / rate_hz` from 0, and the end, which
+    /// replaces the last regular time where they coincide.
+    ///
+    /// * `max_rows`: maximum number of rows; more means a wrong rate.
+    ///
+    /// # Errors
+    /// [`TrajectoryError::Value`] unless the rate is positive and gives at most `max_rows`.
+    pub fn row_times(
+        &self,
+        rate_hz: f64,
+        max_rows: u32,
+    ) -> Result<impl ExactSizeIterator<Item = f64> + use<>, TrajectoryError> {
+        let duration_s = self.duration;
+        let intervals = duration_s * rate_hz;
+        if !(rate_hz > 0.0 && rate_hz.is_finite() && intervals <= f64::from(max_rows)) {
+            return Err(TrajectoryError::Value(format!(
+                "sampling rate {rate_hz} Hz is not possible for {duration_s} s of motion; give a positive rate that \
+                 makes at most {max_rows} rows"
+            )));
+        }
+        let regular = (intervals - 1e-6).ceil().max(1.0) as u32;
+        let time = move |k| if k == regular { duration_s } else { f64::from(k) / rate_hz };
+        Ok((0..regular + 1).map(time))
+    }
+
     /// Returns the same motion with the joints in the order of `names`.
     ///
     /// # Errors
@@ -189,13 +221,15 @@ impl Trajectory {
         Ok(Self {
             joints: order.iter().map(|&i| self.joints[i].clone()).collect(),
             curves: order.iter().map(|&i| self.curves[i].clone()).collect(),
-            duration: self.duration,
+            gaps: self.gaps.clone(),
             notes: self.notes.clone(),
+            dropped_columns: Vec::new(),
             stated: Vec::new(),
+            ..*self
         })
     }
 
-    /// Returns the same motion without some joints.
+    /// Returns the same motion without the named joints; other names have no effect.
     #[must_use]
     pub fn without_joints(&self, names: &[String]) -> Self {
         let mut rest = self.clone();
@@ -221,7 +255,16 @@ impl Trajectory {
             let pieces = vec![Piece::constant(self.duration, *value)];
             curves.push(Curve { knots: vec![0.0, self.duration], pieces });
         }
-        Self::from_curves(joints, curves, self.duration, self.notes.clone())
+        self.with_curves(joints, curves)
+    }
+
+    /// Returns other curves over the same time, with the gaps and notes of this motion.
+    ///
+    /// # Errors
+    /// As [`Trajectory::from_curves`].
+    pub(crate) fn with_curves(&self, joints: Vec<String>, curves: Vec<Curve>) -> Result<Self, TrajectoryError> {
+        let made = Self::from_curves(joints, curves, self.duration, self.notes.clone())?;
+        Ok(made.with_gaps(self.gaps.clone()))
     }
 
     /// Combines motions of different joints into one; each part begins at its own time, and its
@@ -236,7 +279,7 @@ impl Trajectory {
     /// a part is lost in its rounding.
     pub fn side_by_side(parts: &[(f64, Self)]) -> Result<Self, TrajectoryError> {
         let duration = parts.iter().map(|(start, part)| start + part.duration).fold(0.0, f64::max);
-        let (mut joints, mut curves, mut notes): (Vec<String>, Vec<Curve>, Vec<Warning>) = Default::default();
+        let (mut joints, mut curves, mut gaps, mut notes) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         for (start, part) in parts {
             for (joint, curve) in part.joints.iter().zip(&part.curves) {
                 if joints.contains(joint) {
@@ -248,14 +291,15 @@ impl Trajectory {
                 joints.push(joint.clone());
                 curves.push(curve.within(*start, duration));
             }
-            for note in &part.notes {
-                add_note(&mut notes, note.clone().at_times(*start, 1.0));
+            notes.extend(part.notes.iter().cloned());
+            for gap in &part.gaps {
+                add_gap(&mut gaps, gap.at_times(*start, 1.0));
             }
         }
         if joints.is_empty() {
             return Err(SampleError::no_joint().into());
         }
-        Self::from_curves(joints, curves, duration, notes)
+        Ok(Self::from_curves(joints, curves, duration, notes)?.with_gaps(gaps))
     }
 
     /// Returns the same path with the time multiplied by `factor`: 2 halves every velocity.
@@ -273,10 +317,10 @@ impl Trajectory {
             pieces: curve.pieces.iter().map(|piece| piece.mapped(0.0, 1.0, factor)).collect(),
         };
         let curves = self.curves.iter().map(stretch).collect();
-        // The planner's notes on times and limits apply only to the unscaled motion.
-        let notes = self.notes.iter().filter(|note| !note.depends_on_time());
-        let notes = notes.map(|note| note.clone().at_times(0.0, factor)).collect();
-        Self::from_curves(self.joints.clone(), curves, self.duration * factor, notes)
+        // The planner's note on times and limits applies only to the unscaled motion.
+        let notes = self.notes.iter().filter(|note| note.code != SHORT_DURATION).cloned().collect();
+        let gaps = self.gaps.iter().map(|gap| gap.at_times(0.0, factor)).collect();
+        Ok(Self::from_curves(self.joints.clone(), curves, self.duration * factor, notes)?.with_gaps(gaps))
     }
 
     /// Returns the velocity jumps by time: corners of sampled data, and both ends if the motion
@@ -343,26 +387,25 @@ impl Trajectory {
         self.curves.iter().map(|curve| curve.start()[1].abs()).fold(0.0, f64::max)
     }
 
-    /// Returns all warnings a user should know before trusting a result: velocity jumps at the
-    /// ends, acceleration jumps, and the notes of the file reader or planner.
-    pub fn warnings(&self) -> Vec<Warning> {
-        let mut warnings = self.notes.clone();
-        for (joint, curve) in self.joints.iter().zip(&self.curves) {
-            warnings.extend(Warning::of_curve(joint, curve));
-        }
-        warnings
+    /// Returns all warnings a user should know before trusting a result: gaps in the samples, the
+    /// findings of the file reader or planner, velocity jumps at the ends and in between, and
+    /// acceleration jumps.
+    ///
+    /// The location of a warning is its place in the file, the name of its joint, or empty for the
+    /// motion as a whole.
+    pub fn warnings(&self) -> Vec<Finding> {
+        let of_curves = self.joints.iter().zip(&self.curves).flat_map(|(joint, curve)| of_curve(joint, curve));
+        self.gaps.iter().map(Gap::warning).chain(self.notes.iter().cloned()).chain(of_curves).collect()
+    }
+
+    /// Places where samples are missing in evenly sampled data.
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
     }
 
     /// Returns the columns of a table that are not part of the motion.
-    pub fn dropped_columns(&self) -> impl Iterator<Item = &String> {
-        self.notes.iter().flat_map(|note| match note {
-            Warning::DroppedColumns { columns } => &columns[..],
-            _ => &[],
-        })
-    }
-
-    pub(crate) fn notes(&self) -> &[Warning] {
-        &self.notes
+    pub fn dropped_columns(&self) -> &[String] {
+        &self.dropped_columns
     }
 
     pub(crate) fn curves(&self) -> &[Curve] {
@@ -393,33 +436,33 @@ impl Trajectory {
                 "joint {joint:?} slides, and its numbers are read as degrees; add {joint:?} to `metres` and give them in m"
             ),
         };
-        Err(Problem::new("unit-of-joint", message).at(origin, Some(*line), None))
+        Err(at(&Place::of_file(origin).line(*line), fault("unit-of-joint", message)).into())
     }
 
     pub(crate) fn with_stated_units(self, stated: Vec<StatedUnit>) -> Self {
         Self { stated, ..self }
     }
 
-    /// Adds a note of a reader about its file.
-    pub(crate) fn with_note(mut self, note: Warning) -> Self {
+    pub(crate) fn with_gaps(self, gaps: Vec<Gap>) -> Self {
+        Self { gaps, ..self }
+    }
+
+    pub(crate) fn with_dropped_columns(self, dropped_columns: Vec<String>) -> Self {
+        Self { dropped_columns, ..self }
+    }
+
+    /// Adds a finding of a reader about its file.
+    pub(crate) fn with_note(mut self, note: Finding) -> Self {
         self.notes.push(note);
         self
     }
 }
 
-/// Adds a note; a gap that is already noted takes the joints of the new one.
-fn add_note(notes: &mut Vec<Warning>, note: Warning) {
-    if let Warning::Gaps { joints, sample, from_s, to_s, .. } = &note {
-        let same = notes.iter_mut().find_map(|other| match other {
-            Warning::Gaps { joints, sample: k, from_s: from, to_s: to, .. } => {
-                (sample == k && from_s == from && to_s == to).then_some(joints)
-            }
-            _ => None,
-        });
-        if let Some(known) = same {
-            known.extend(joints.iter().cloned());
-            return;
-        }
+/// Adds a gap; one that is known takes the joints of the new one.
+fn add_gap(gaps: &mut Vec<Gap>, gap: Gap) {
+    let same = |other: &&mut Gap| [other.from_s, other.to_s] == [gap.from_s, gap.to_s] && other.sample == gap.sample;
+    match gaps.iter_mut().find(same) {
+        Some(known) => known.joints.extend(gap.joints),
+        None => gaps.push(gap),
     }
-    notes.push(note);
 }

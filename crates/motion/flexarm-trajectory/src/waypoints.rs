@@ -44,11 +44,11 @@
 //!
 //! Start at [`Trajectory::parse_toml`]. Not here: the mathematics of the moves ([`crate::Plan`]).
 
-use flexarm_settings::exact;
+use flexarm_settings::{Finding, Place, exact};
 
 use crate::error::TrajectoryError;
+use crate::findings::{at, fault, unknown_format};
 use crate::limits::JointLimits;
-use crate::problem::{PlanError, Problem};
 use crate::samples_toml::{self, SamplesFileToml, has_samples};
 use crate::trajectory::Trajectory;
 use crate::waypoints_check::{Checked, check, stated_units};
@@ -64,43 +64,40 @@ impl Trajectory {
     /// # Errors
     /// [`TrajectoryError::File`] with line and column of the problem and its remedy.
     pub fn parse_toml(text: &str, origin: &str, limits: &[(&str, JointLimits)]) -> Result<Self, TrajectoryError> {
-        let fail = |offset: Option<usize>, problem: Problem| {
-            let (line, column) = offset.map(|offset| place(text, offset)).unzip();
-            problem.at(origin, line, column)
+        let file = Place::of_file(origin);
+        let fail = |offset: Option<usize>, fault: Box<Finding>| {
+            let place = offset.map(|offset| line_and_column(text, offset));
+            TrajectoryError::File(at(&place.map_or(file.clone(), |(line, column)| file.at(line, column)), fault))
         };
         let unread = |error: toml::de::Error| {
             let message = flexarm_settings::without_types(error.message());
             let message = format!("{message}; docs/motions.md has all keys, with types and units");
-            fail(error.span().map(|span| span.start), Problem::new("toml", message))
+            fail(error.span().map(|span| span.start), fault("toml", message))
         };
-        let line = |offset: usize| place(text, offset).0;
+        let line = |offset: usize| line_and_column(text, offset).0;
         if has_samples(text) {
             let file: SamplesFileToml = toml::Deserializer::parse(text).and_then(exact).map_err(unread)?;
             if *file.format.get_ref() != 1 {
-                return Err(fail(Some(file.format.span().start), Problem::format(*file.format.get_ref())));
+                return Err(fail(Some(file.format.span().start), unknown_format(*file.format.get_ref())));
             }
-            let read = samples_toml::trajectory(&file).map_err(|error| fail(error.offset, error.problem))?;
+            let read = samples_toml::trajectory(&file).map_err(|error| fail(error.offset, error.fault))?;
             return Ok(read.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)));
         }
         let file: FileToml = toml::Deserializer::parse(text).and_then(exact).map_err(unread)?;
 
-        let Checked { plan, odd, move_offsets } =
-            check(&file, limits).map_err(|error| fail(error.offset, error.problem))?;
-        let planned = plan.build().map_err(|error| match error {
-            TrajectoryError::Plan(error) => {
-                let offset = PlanError::move_number(&error).and_then(|number| move_offsets.get(number - 1).copied());
-                fail(offset, error.into())
-            }
-            TrajectoryError::OutOfRange { joint, .. } => fail(None, Problem::out_of_range(&joint)),
-            other => other,
+        let Checked { plan, odd_limit, move_offsets } =
+            check(&file, limits).map_err(|error| fail(error.offset, error.fault))?;
+        let planned = plan.build().map_err(|error| {
+            let number = if let TrajectoryError::Plan(error) = &error { error.move_number() } else { None };
+            fail(number.and_then(|number| move_offsets.get(number - 1).copied()), error.into())
         })?;
-        let planned = odd.into_iter().fold(planned, Self::with_note);
+        let planned = odd_limit.into_iter().fold(planned, Self::with_note);
         Ok(planned.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)))
     }
 }
 
 /// Line and column (in characters) of a byte offset, both from 1.
-fn place(text: &str, offset: usize) -> (usize, usize) {
+fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     let before = text.as_bytes().get(..offset).map(String::from_utf8_lossy).unwrap_or_default();
     let line = before.matches('\n').count() + 1;
     let column = before.rsplit('\n').next().map_or(0, |start| start.chars().count()) + 1;

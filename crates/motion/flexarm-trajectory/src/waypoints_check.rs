@@ -7,46 +7,46 @@
 use std::fmt::Display;
 use std::ops::Range;
 
+use flexarm_settings::Finding;
 use toml::Spanned;
 
 use crate::curve::LONGEST;
+use crate::findings::{self, fault, unknown_format, unknown_unit};
 use crate::limits::JointLimits;
 use crate::plan::{MotionLimits, Plan, PlannedMove, Profile};
 use crate::polynomial::FARTHEST;
-use crate::problem::Problem;
 use crate::trajectory::StatedUnit;
-use crate::warning::Warning;
 use crate::waypoints_toml::{FileToml, LawToml, MoveToml, ProfileToml, Values};
 
 /// Default rounding of trapezoids.
 const DEFAULT_ROUNDING: f64 = 0.1;
 
-/// A problem and its byte offset in the file.
+/// An error and its byte offset in the file.
 pub(crate) struct Located {
     pub(crate) offset: Option<usize>,
-    pub(crate) problem: Problem,
+    pub(crate) fault: Box<Finding>,
 }
 
 /// The plan, a limit that does not suit the others, and the offset of each move in the text.
 pub(crate) struct Checked {
     pub(crate) plan: Plan,
-    pub(crate) odd: Option<Warning>,
+    pub(crate) odd_limit: Option<Finding>,
     pub(crate) move_offsets: Vec<usize>,
 }
 
-fn located(span: Range<usize>, problem: Problem) -> Located {
-    Located { offset: Some(span.start), problem }
+fn located(span: Range<usize>, fault: Box<Finding>) -> Located {
+    Located { offset: Some(span.start), fault }
 }
 
 pub(crate) fn bad_value(span: Range<usize>, key: &str, found: impl Display, expected: &'static str) -> Located {
-    located(span, Problem::value(key, found, expected))
+    located(span, findings::bad_value(key, found, expected))
 }
 
 /// Converts and checks the file.
 pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Checked, Located> {
     let format = *file.format.get_ref();
     if format != 1 {
-        return Err(located(file.format.span(), Problem::format(format)));
+        return Err(located(file.format.span(), unknown_format(format)));
     }
     let joints = joint_names(&file.joints)?;
     let context = Context { file, scales: scales(&file.unit, &file.metres, &joints)?, joints };
@@ -64,12 +64,12 @@ pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Ch
     // Without the fraction of the speed at which a move is made.
     let of_joint = |(limits, (full, joint)): (&MotionLimits, (&MotionLimits, &String))| {
         let own = known.iter().find(|(name, _)| name == joint).map_or(f64::INFINITY, |(_, robot)| robot.velocity);
-        MotionLimits { velocity: full.velocity, ..*limits }.odd(joint, own)
+        MotionLimits { velocity: full.velocity, ..*limits }.unusual(joint, own)
     };
-    let odd = moves.iter().find_map(|planned: &PlannedMove| {
+    let odd_limit = moves.iter().find_map(|planned: &PlannedMove| {
         planned.limits.iter().zip(robot_limits.iter().zip(&context.joints)).find_map(of_joint)
     });
-    Ok(Checked { plan: Plan { joints: context.joints, start, moves }, odd, move_offsets })
+    Ok(Checked { plan: Plan { joints: context.joints, start, moves }, odd_limit, move_offsets })
 }
 
 pub(crate) fn joint_names(joints: &Spanned<Vec<Spanned<String>>>) -> Result<Vec<String>, Located> {
@@ -99,7 +99,7 @@ pub(crate) fn scales(
         "rad" => 1.0,
         "deg" => std::f64::consts::PI / 180.0,
         found => {
-            return Err(located(unit.span(), Problem::unknown_unit("unit", found, "\"rad\", \"deg\"")));
+            return Err(located(unit.span(), unknown_unit("unit", found, "\"rad\", \"deg\"")));
         }
     };
     for entry in metres {
@@ -132,7 +132,7 @@ pub(crate) fn stated_units(
 }
 
 fn unknown_joint(entry: &Spanned<String>, key: &'static str, joints: &[String]) -> Located {
-    located(entry.span(), Problem::unknown_joint(key, entry.get_ref(), joints))
+    located(entry.span(), findings::unknown_joint(key, entry.get_ref(), joints))
 }
 
 /// Data shared by all moves.
@@ -158,14 +158,16 @@ impl Context<'_> {
     }
 
     fn out_of_range(&self, span: Range<usize>, joint: usize) -> Located {
-        located(span, Problem::out_of_range(&self.joints[joint]))
+        let joint = &self.joints[joint];
+        let message = format!("joint {joint:?} goes beyond {FARTHEST:e} rad or m; check the units of the file");
+        located(span, fault("out-of-range", message))
     }
 
     fn list(&self, list: &[f64], span: Range<usize>, key: &'static str) -> Result<Vec<f64>, Located> {
         if list.len() != self.joints.len() {
             let (found, expected) = (list.len(), self.joints.len());
             let message = format!("`{key}` has {found} entries; expected {expected}, one for each of `joints`");
-            return Err(located(span, Problem::new("list-length", message)));
+            return Err(located(span, fault("list-length", message)));
         }
         match list.iter().find(|value| !value.is_finite()) {
             Some(value) => Err(bad_value(span, key, value, "finite numbers")),

@@ -1,12 +1,11 @@
 //! Samples that are missing.
 
-use flexarm_trajectory::{JointSamples, Samples, Warning};
+use flexarm_trajectory::{Gap, JointSamples, Samples};
 
-fn found(times: &[f64], position: impl Fn(f64) -> f64) -> Option<Warning> {
+fn found(times: &[f64], position: impl Fn(f64) -> f64) -> Option<Gap> {
     let position = times.iter().map(|t| position(*t)).collect();
     let joints = vec![JointSamples { name: "j".into(), position, ..JointSamples::default() }];
-    let warnings = Samples { times: times.to_vec(), joints }.interpolate().unwrap().warnings();
-    warnings.into_iter().find(|warning| matches!(warning, Warning::Gaps { .. }))
+    Samples { times: times.to_vec(), joints }.interpolate().unwrap().gaps().first().cloned()
 }
 
 fn sampled(n: usize, step: f64) -> Vec<f64> {
@@ -25,7 +24,7 @@ fn missing_samples_are_found_with_their_place_also_where_clocks_jitter() {
         let mut times: Vec<f64> = sampled(500, 0.02).iter().map(|t| t + 0.02 * jitter * random()).collect();
         assert_eq!(found(&times, f64::sin), None, "{jitter}");
         times.drain(201..221);
-        let Some(Warning::Gaps { count: 1, sample: 201, from_s, to_s, usual_s, .. }) = found(&times, f64::sin) else {
+        let Some(Gap { count: 1, sample: 201, from_s, to_s, usual_s, .. }) = found(&times, f64::sin) else {
             panic!("{jitter}: {:?}", found(&times, f64::sin))
         };
         assert_eq!([from_s, to_s], [times[200] - times[0], times[201] - times[0]]);

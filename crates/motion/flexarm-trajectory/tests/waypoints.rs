@@ -212,8 +212,8 @@ fn numbers_beyond_any_motion_are_refused_with_their_place() {
     for (moves, key) in [
         ("to = [1, 2]\nduration = 1e300", "`duration` is 1"),
         ("to = [1, 2]\nduration = 1\nhold = 1e8", "`hold` is 100000000"),
-        ("to = [1e12, 2]\nduration = 1", "joint \"a\": values or times are too extreme"),
-        ("to = { b = 1e12 }\nduration = 1", "joint \"b\": values or times are too extreme"),
+        ("to = [1e12, 2]\nduration = 1", "joint \"a\" goes beyond 1e9 rad or m"),
+        ("to = { b = 1e12 }\nduration = 1", "joint \"b\" goes beyond 1e9 rad or m"),
     ] {
         let fault = fault(&format!("{HEAD}[[move]]\n{moves}"));
         assert!(fault.location.starts_with("arm.toml:") && fault.to_string().contains(key), "{fault}");

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use flexarm_trajectory::MISSING_LIMIT;
+use flexarm_trajectory::{LimitViolation, MISSING_LIMIT};
 use nalgebra::Vector6;
 
 use crate::arm::options::Modelling;
@@ -30,9 +30,10 @@ fn error(code: &str, location: String, error: &dyn std::fmt::Display) -> Finding
     Finding::error(code, location, error.to_string(), "")
 }
 
-/// Moves the file of a caveat from its message to its place.
+/// Moves the place of a caveat, the file if it has none in it, from its message to its location.
 fn about(file: &Path, caveat: Finding) -> Finding {
-    let location = file.display().to_string();
+    let file = file.display().to_string();
+    let location = if caveat.location.starts_with(&format!("{file}:")) { caveat.location } else { file };
     let message = caveat.message.strip_prefix(&format!("{location}: ")).unwrap_or(&caveat.message).to_owned();
     Finding { location, message, ..caveat }
 }
@@ -193,8 +194,11 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
         Ok(motion) => {
             let help = "slow the motion down or keep away from the limit";
             let likely = || motion.likely.to_owned();
-            let passed = |v| Finding { help: help.into(), likely: likely(), ..error("joint-limit", file(), v) };
-            findings.extend(motion.violations.iter().map(|v| passed(v)));
+            let passed = |v: &LimitViolation| {
+                let error = error("joint-limit", file(), &v.warning().message);
+                Finding { help: help.into(), likely: likely(), ..error }
+            };
+            findings.extend(motion.violations.iter().map(passed));
             let closed = robot.rigid_model().map(|model| loops::along_motion(&model, &motion.trajectory).err());
             findings.extend(closed.ok().flatten().map(|e| error("loop", file(), &e)));
             let balancers = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));

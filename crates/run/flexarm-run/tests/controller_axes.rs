@@ -88,7 +88,7 @@ fn a_program_moves_the_joints_to_where_its_axis_values_are_by_zero_sense_and_cou
         }
     }
     let told: Vec<String> = motion.caveats().into_iter().map(|caveat| caveat.message).collect();
-    let told = told.iter().chain(&motion.warnings).find(|text| text.contains("joint_a3 = A3")).cloned();
+    let told = told.into_iter().find(|text| text.contains("joint_a3 = A3"));
     let told = told.unwrap_or_default();
     assert!(told.contains("joint_a1 = -A1") && told.contains("joint_a3 = A3 + 90.0000 - 1 A2"), "{told:?}");
 }

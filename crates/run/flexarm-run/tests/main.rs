@@ -29,6 +29,7 @@ mod loops;
 mod magnification;
 mod model_limits;
 mod monitors;
+mod motion_places;
 mod mounting;
 mod no_allocation;
 mod program_round_trip;

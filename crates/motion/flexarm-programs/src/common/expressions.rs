@@ -1,4 +1,9 @@
 //! Expression parser for KRL, RAPID and URScript, which differ in their operators and aggregates.
+//!
+//! [`Parser`] also holds the tokens for the parsers of statements in the languages. Binary
+//! operators are parsed by precedence: [`Parser::binary`] takes operators of a level and above, and
+//! calls itself one level higher for the right side. Depth and length are limited, so that no text
+//! exhausts the stack. Not here: statements (`parse.rs` of each language), values (`machine`).
 
 use std::rc::Rc;
 
@@ -185,6 +190,7 @@ impl Parser {
 
     /// Operator that comes next, with its precedence.
     fn operator(&self) -> Option<(Operator, u8)> {
+        // Levels from 0 (binds least) to 9; 7 is the sign.
         use Operator::*;
         let (operator, level) = match self.peek() {
             Token::Symbol("+") => (Add, 5),
@@ -243,6 +249,7 @@ impl Parser {
 
     fn primary(&mut self) -> Result<Expr> {
         let start = self.span();
+        // A literal, something in brackets, or a name, which may be a call.
         let literal = |value, span| Ok(Expr { kind: Kind::Literal(value), span });
         match self.peek().clone() {
             Token::Number(value, whole) => {

@@ -1,4 +1,8 @@
 //! Lexer for the three languages with expressions.
+//!
+//! Start at [`tokens`]; a [`Spelling`] holds what differs between KRL, RAPID and URScript. Not
+//! here: G-code, which has words instead of expressions (`gcode/words.rs`), and the grammar
+//! (`expressions`).
 
 use std::rc::Rc;
 
@@ -47,6 +51,7 @@ pub(crate) fn tokens(text: &str, file: usize, spelling: &Spelling) -> Result<Vec
     let bytes = text.as_bytes();
     let mut at = 0;
     while at < bytes.len() {
+        // One token, or what stands between two; `push` returns the number of bytes taken.
         let rest = &text[at..];
         let first = rest.chars().next().unwrap_or(' ');
         let mut push = |token, length: usize| {

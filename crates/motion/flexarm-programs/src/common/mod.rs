@@ -47,7 +47,7 @@ pub(crate) fn fail<T>(span: Span, message: impl Into<String>) -> Result<T> {
 pub(crate) struct Text {
     pub(crate) path: std::path::PathBuf,
     /// The file as a whole.
-    pub(crate) place: Place,
+    pub(crate) file: Place,
     pub(crate) text: Rc<str>,
     /// Start of each line.
     lines: Vec<usize>,
@@ -56,12 +56,14 @@ pub(crate) struct Text {
 impl Text {
     pub(crate) fn new(path: &std::path::Path, text: &str) -> Self {
         let lines = std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
-        Self { path: path.to_owned(), place: Place::of_file(path.display()), text: text.into(), lines }
+        Self { path: path.to_owned(), file: Place::of_file(path.display()), text: text.into(), lines }
     }
 
-    /// Line of a byte offset, from 1.
-    pub(crate) fn line(&self, at: usize) -> usize {
-        self.lines.partition_point(|&start| start <= at)
+    /// Place of a byte offset.
+    pub(crate) fn place(&self, at: usize) -> Place {
+        let line = self.lines.partition_point(|&start| start <= at);
+        let before = self.text.get(self.lines[line - 1]..at).unwrap_or_default();
+        self.file.at(line, before.chars().count() + 1)
     }
 
     /// Text of a span, on one line and shortened for messages.

@@ -1,4 +1,8 @@
 //! Recorder of a running program: its moves, its notes, and the resulting position of the robot.
+//!
+//! Languages call [`Recorder::add`] and [`Recorder::dwell`] for motion and [`Recorder::note`] for
+//! what they assume or leave out; [`Recorder::pose`] gives the pose of the tool for targets that
+//! are not complete. Frames as in [`flexarm_path::program`]. Not here: the interpreter (`machine`).
 
 use flexarm_path::program::{Blend, Item, Move, MoveKind, Program, Target};
 use flexarm_settings::{Finding, Place};
@@ -36,16 +40,16 @@ pub(crate) struct Recorded {
     pub(crate) sources: Vec<Sources>,
 }
 
-/// A note that is given once, with all its lines.
+/// A note that is given once, with all its places.
 struct RepeatedNote {
     text: String,
     file: usize,
-    lines: Vec<usize>,
-    times: usize,
+    /// Byte offsets of the statements; empty for a note about the program as a whole.
+    starts: Vec<usize>,
 }
 
-/// Maximum number of lines listed in a note.
-const LINES_OF_A_NOTE: usize = 8;
+/// Maximum number of further places that a note names.
+const MAX_PLACES: usize = 3;
 
 /// Position of the robot after the moves so far.
 #[allow(clippy::large_enum_variant, reason = "there is one of it")]
@@ -76,33 +80,21 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    fn line(&self, span: Span) -> usize {
-        self.texts[span.file].line(span.start)
-    }
-
-    /// Line in the file.
     pub(crate) fn place(&self, span: Span) -> Place {
-        self.texts[span.file].place.line(self.line(span))
+        self.texts[span.file].place(span.start)
     }
 
     pub(crate) fn excerpt(&self, span: Span) -> String {
         self.texts[span.file].excerpt(span)
     }
 
-    /// Adds a note for the user; repeated notes only add their line.
+    /// Adds a note for the user; repeated notes only add their place.
     pub(crate) fn note(&mut self, text: &str, span: Span) {
-        let line = self.line(span);
         match self.notes.iter_mut().find(|note| note.text == text && note.file == span.file) {
-            Some(note) => {
-                if !note.lines.contains(&line) {
-                    note.times += 1;
-                    if note.lines.len() < LINES_OF_A_NOTE {
-                        note.lines.push(line);
-                    }
-                }
-            }
+            Some(note) if note.starts.contains(&span.start) => {}
+            Some(note) => note.starts.push(span.start),
             None => {
-                self.notes.push(RepeatedNote { text: text.to_owned(), file: span.file, lines: vec![line], times: 1 })
+                self.notes.push(RepeatedNote { text: text.to_owned(), file: span.file, starts: vec![span.start] });
             }
         }
     }
@@ -110,7 +102,7 @@ impl<'a> Recorder<'a> {
     /// Adds a note about the program as a whole.
     pub(crate) fn note_all(&mut self, text: &str) {
         if !self.notes.iter().any(|note| note.text == text) {
-            self.notes.push(RepeatedNote { text: text.to_owned(), file: 0, lines: Vec::new(), times: 0 });
+            self.notes.push(RepeatedNote { text: text.to_owned(), file: 0, starts: Vec::new() });
         }
     }
 
@@ -268,7 +260,7 @@ impl<'a> Recorder<'a> {
 
     /// Returns the recorded program.
     pub(crate) fn finish(mut self, name: &str) -> Recorded {
-        self.notes.sort_by_key(|note| (note.file, note.lines.first().copied().unwrap_or(0)));
+        self.notes.sort_by_key(|note| (note.file, note.starts.first().copied()));
         let texts = &self.texts;
         let notes = self.notes.iter().map(|note| note.as_note(texts)).collect();
         Recorded { program: Program { name: name.to_owned(), items: self.items, notes }, sources: self.sources }
@@ -276,22 +268,18 @@ impl<'a> Recorder<'a> {
 }
 
 impl RepeatedNote {
-    /// The note at its first line, with the further lines in its text.
+    /// The note at its first place, with further places in its text.
     fn as_note(&self, texts: &[Text]) -> Finding {
-        let file = &texts[self.file].place;
-        let Some((first, others)) = self.lines.split_first() else {
-            return Finding::warning("program", file.to_string(), self.text.clone(), "").as_note();
+        let text = &texts[self.file];
+        let Some((first, others)) = self.starts.split_first() else {
+            return Finding::warning("program", text.file.to_string(), self.text.clone(), "").as_note();
         };
-        let others: Vec<String> = others.iter().map(usize::to_string).collect();
-        let more = match self.times - self.lines.len() {
-            0 => String::new(),
-            more => format!(" and {more} more"),
+        let named: Vec<String> = others.iter().take(MAX_PLACES).map(|start| text.place(*start).to_string()).collect();
+        let also = match others.len() - named.len() {
+            0 if named.is_empty() => String::new(),
+            0 => format!(" (also at {})", named.join(", ")),
+            more => format!(" (also at {} and {more} more)", named.join(", ")),
         };
-        let also = match others.len() {
-            0 => String::new(),
-            1 => format!(" (also in line {}{more})", others[0]),
-            _ => format!(" (also in lines {}{more})", others.join(", ")),
-        };
-        Finding::warning("program", file.line(*first).to_string(), format!("{}{also}", self.text), "").as_note()
+        Finding::warning("program", text.place(*first).to_string(), format!("{}{also}", self.text), "").as_note()
     }
 }

@@ -1,4 +1,7 @@
 //! Syntax trees: expressions, statements, routines.
+//!
+//! One tree serves KRL, RAPID and URScript; each node knows its [`Span`]. Not here: parsers
+//! (`expressions`, and `parse` of each language), the interpreter (`machine`).
 
 use std::rc::Rc;
 

@@ -1,4 +1,7 @@
 //! Values of variables and expressions.
+//!
+//! A value has the type that its language gives it ([`Value::kind`] names it for messages);
+//! [`Value::Outside`] stands for a value that only the controller knows.
 
 use std::rc::Rc;
 

@@ -1,4 +1,8 @@
 //! G2 and G3: arcs in the three planes, given by centres or radii, full circles and helices.
+//!
+//! Start at [`Gcode::arc`]. A helix becomes flat arcs through three of its points each, as many as
+//! the allowed error asks for; a flat arc is divided where it is nearly a full circle. Lengths are
+//! in m, in the work frame B. Not here: lines and rapids (`moves`).
 
 use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};

@@ -1,4 +1,8 @@
 //! Work frames, offsets and the reference point of G-code.
+//!
+//! A work frame B is known by its code in tenths (540 for G54); its pose in the world of the
+//! controller comes from the options or from G10. The offset of G92 shifts all frames. Lengths are
+//! in m.
 
 use std::collections::HashMap;
 

@@ -86,6 +86,7 @@ pub(crate) fn read(texts: &mut [Text], options: &ReadOptions<'_>) -> Result<Reco
             }
         }
     }
+    // Line by line; a second `%` ends the program, unless there was no move before it.
     let mut program = Gcode::new(Recorder::new(options, texts.to_vec()));
     let (mut start, mut percents, mut is_over) = (0, 0, false);
     for line in text.split_inclusive('\n') {
@@ -171,6 +172,7 @@ impl<'a> Gcode<'a> {
         let mut values: HashMap<char, (f64, Span)> = HashMap::new();
         let mut is_over = false;
         let mut comes_to_stop = false;
+        // Codes, coordinates, and words that do not move the tool.
         for Word { letter, value, span } in &line.words {
             match letter {
                 'G' => codes.push(((value * 10.0).round() as i32, *span)),
@@ -197,6 +199,7 @@ impl<'a> Gcode<'a> {
                 }
             }
         }
+        // In the order of the standard: modes, feed, codes that act once, motion.
         check_groups(&codes)?;
         if comes_to_stop {
             self.recorder.stop();
@@ -235,6 +238,7 @@ impl<'a> Gcode<'a> {
 
     /// Executes non-modal codes; returns `false` if they consume the coordinates of the line.
     fn other_codes(&mut self, codes: &[(i32, Span)], values: &HashMap<char, (f64, Span)>, span: Span) -> Result<bool> {
+        // G4 dwell, G43 length, G28 and G30 reference, G10 frame, G92 offset; codes in tenths.
         let mut moves = true;
         for &(code, at) in codes {
             match code {

@@ -1,4 +1,7 @@
 //! Modal codes of G-code: which are in force, which contradict each other, which are not read.
+//!
+//! Codes are in tenths (590 is G59, 591 G59.1). Codes of one modal group must not occur twice in a
+//! line ([`check_groups`]). Not here: codes that act once (`mod.rs`, `frames`).
 
 use std::collections::HashMap;
 
@@ -12,6 +15,8 @@ use crate::common::{Result, Span, fail};
 impl Gcode<'_> {
     /// Sets the modes, in the order of the standard, before any motion.
     pub(super) fn modes(&mut self, codes: &[(i32, Span)], values: &HashMap<char, (f64, Span)>) -> Result<()> {
+        // Motion, plane, unit, coordinates, centres, feed, blend, work frame, then codes that act
+        // once.
         for &(code, span) in codes {
             match code {
                 0 => self.motion = Some(Motion::Rapid),

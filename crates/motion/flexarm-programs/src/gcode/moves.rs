@@ -1,4 +1,7 @@
 //! Moves of G-code: from the coordinates of a line to rapids, lines and arcs.
+//!
+//! Start at [`Gcode::motion_of_line`]. Coordinates are of the tool in the work frame B, in m, after
+//! the unit of the program (G20, G21). Not here: arcs (`arcs`), feed and planes (`modes`).
 
 use std::collections::HashMap;
 
@@ -164,7 +167,7 @@ impl Gcode<'_> {
         let [a, b, c] = self.rotary;
         let R_BT = rotation_zyx(c, b, a) * self.recorder.options.gcode.R_BT;
         let X_BT = Pose::from_parts(Translation3::from(to + self.offset), R_BT);
-        let to = Target::Pose { X_BT, configuration: Configuration::Nearest };
+        let to = Target::Pose { X_BT, configuration: Configuration::NEAREST };
         let X_WB = self.frame(self.work_frame);
         self.recorder.add(
             Move { place: Place::default(), statement: String::new(), kind, to, X_WB, X_FT: None, speed, blend },

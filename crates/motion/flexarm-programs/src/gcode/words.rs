@@ -1,5 +1,9 @@
 //! Splits lines of G-code into words: letters with numbers, which may be expressions with
 //! parameters.
+//!
+//! Start at [`Parameters::line`]. Values are as written, without units. Parameters are numbered
+//! (`#1`) or named (`#<name>`); assignments of a line take effect after its words are read, as the
+//! standard says.
 
 use std::collections::HashMap;
 
@@ -81,6 +85,7 @@ impl Reader<'_> {
         Ok(())
     }
 
+    /// Parses the words of a line and the parameters that it sets.
     fn line(&mut self) -> Result<(Line, Vec<(String, f64)>)> {
         let mut line = Line::default();
         let mut set = Vec::new();
@@ -93,6 +98,7 @@ impl Reader<'_> {
             self.pass()?;
             let from = self.at;
             let Some(&byte) = self.text.get(self.at) else { break };
+            // `#1 = 2`, a program number, or a word.
             if byte == b'#' {
                 self.at += 1;
                 let name = self.parameter_name()?;
@@ -123,6 +129,7 @@ impl Reader<'_> {
             let value = self.value()?;
             line.words.push(Word { letter, value, span: self.span(from) });
         }
+        // Line numbers say nothing.
         line.words.retain(|word| word.letter != 'N');
         Ok((line, set))
     }

@@ -1,4 +1,7 @@
 //! BAS: initial values of the motion, and the data of the inline forms' moves.
+//!
+//! `BAS` is the program of the controller that teach pendants call before each move of an inline
+//! form; what it sets is set here. Not here: newer inline forms, which are functions (`functions`).
 
 use super::system::{Krls, base_data, path_acceleration, record_of, set_axes, set_part, set_path_speed, tool_data};
 use crate::common::tree::Argument;
@@ -23,6 +26,7 @@ pub(super) fn bas(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) ->
         Value::Word(word) => word,
         other => return fail(span, format!("BAS needs a command such as #INITMOV, found {}", other.kind())),
     };
+    // Initial values, single settings, then the data of an inline form's move.
     match &*command {
         "initmov" => initial_motion(machine, span),
         "vel_ptp" | "acc_ptp" => {

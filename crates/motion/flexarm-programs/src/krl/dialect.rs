@@ -1,4 +1,7 @@
 //! KRL in the interpreter: names of the controller, instructions, blocks, types and operators.
+//!
+//! [`Krl`] implements [`Dialect`]: what the interpreter asks about names, calls and types of KRL.
+//! Not here: moves (`motion`), functions (`functions`), initial values (`system`).
 
 use std::rc::Rc;
 

@@ -1,4 +1,7 @@
 //! Functions of KRL: those of the inline forms, and those of numbers and frames.
+//!
+//! Start at [`inline_form`] and [`mathematics`]. Values are as KRL has them, in mm and degrees. Not
+//! here: `BAS` (`bas`), instructions (`dialect`).
 
 use std::rc::Rc;
 

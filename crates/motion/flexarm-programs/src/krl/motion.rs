@@ -1,7 +1,13 @@
 //! Moves: PTP, LIN, CIRC, their relative and spline forms, and SPLINE blocks.
+//!
+//! Start at [`motion`]: it reads the target ([`target`]), the frames in force ([`frames`]), speeds
+//! and blend, and adds one [`Move`]. KRL writes mm and degrees, angles A, B, C about z, y, x; here
+//! m and rad. `X_WB` is the pose of `$BASE` in the world, `X_FT` that of `$TOOL` on the flange,
+//! `X_BT` a target. Not here: system variables and inline forms (`system`, `bas`), syntax
+//! (`parse`).
 
 use flexarm_path::ToolCurve;
-use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target};
+use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Selection, Speed, Target};
 use flexarm_settings::Place;
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;
@@ -92,6 +98,7 @@ pub(super) fn frames(machine: &mut Krls<'_>, span: Span) -> Result<(Pose, Option
             },
         }
     };
+    // A tool of the controller that the files do not hold is looked up by its number.
     if let Some(Value::Outside(what)) = machine.global("$tool")
         && let Some(number) = unknown_tool_number(what)
     {
@@ -108,6 +115,7 @@ pub(super) fn frames(machine: &mut Krls<'_>, span: Span) -> Result<(Pose, Option
             .recorder
             .note_all("no $TOOL is set where the first moves are: the robot's own tool centre point is taken");
     }
+    // $BASE is relative to the world of the cell, in which $ROBROOT places the robot.
     let root = frame(machine, "$robroot")?.unwrap_or_else(Pose::identity);
     let base = base.unwrap_or_else(Pose::identity);
     let X_WB = if root == Pose::identity() { base } else { root.inverse() * base };
@@ -122,6 +130,7 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
             "the robot guides the work piece here ($IPO_MODE = #TCP), which is not read: program the tool with #BASE",
         );
     }
+    // Frames, speeds, and the target with the kind of the move.
     let (stem, is_relative) = match word.strip_suffix("_rel") {
         Some(stem) => (stem, true),
         None => (word, false),
@@ -143,6 +152,7 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
     if !is_joint && matches!(to, Target::Joints(_)) {
         return fail(span, "a path needs a target with X, Y, Z; axis values (A1...) are for PTP");
     }
+    // Knots of a spline are passed; other moves stop or blend as their words say.
     let blend = if machine.dialect.in_spline { Blend::Pass } else { blend(machine, arguments, span)? };
     let end = end_of_arc(machine, &context, &kind, &to, span);
     let step = Move { place: Place::default(), statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
@@ -205,6 +215,7 @@ fn target(
         }
         Ok(parts)
     };
+    // External axes must stay; then either axis values or a pose.
     let external = read(&EXTERNAL)?;
     if context.is_relative {
         if external.iter().flatten().any(|value| *value != 0.0) {
@@ -292,7 +303,11 @@ fn configuration(record: &Record, span: Span) -> Result<Configuration> {
         },
     };
     let (status, turn) = (bits("s")?, bits("t")?);
-    Ok(if status.is_none() && turn.is_none() { Configuration::Nearest } else { Configuration::Kuka { status, turn } })
+    Ok(if status.is_none() && turn.is_none() {
+        Configuration::NEAREST
+    } else {
+        Configuration::Selected(Selection::Kuka { status, turn })
+    })
 }
 
 /// Applies `$ORI_TYPE` to the orientation at the end of a path; `turned` is the rotation due to

@@ -1,5 +1,8 @@
 //! Parser of KRL lines. An unsupported line becomes a statement that is an error only where it is
 //! reached.
+//!
+//! Start at [`parse`], which gives the routines, data and statements of one file as a [`Unit`]. Not
+//! here: expressions ([`crate::common::expressions`]), meaning of instructions (`dialect`).
 
 use std::rc::Rc;
 
@@ -79,6 +82,7 @@ fn pass_line(parser: &mut Parser) {
 fn routine(parser: &mut Parser) -> Result<Routine> {
     let span = parser.span();
     parser.take_word("global");
+    // A function has a type before its name, of which an array has brackets.
     let is_function = &*parser.expect_name()? == "deffct";
     if is_function {
         parser.expect_name()?;
@@ -87,6 +91,7 @@ fn routine(parser: &mut Parser) -> Result<Routine> {
         }
     }
     let name = parser.expect_name()?;
+    // Parameters return their values unless they are marked `:IN`.
     let mut parameters = Vec::new();
     if parser.take_symbol("(") {
         while !parser.is_symbol(")") {
@@ -174,6 +179,7 @@ fn structure(parser: &mut Parser, word: &str) -> Result<Option<Action>> {
     if is_assigned(parser) {
         return Ok(None);
     }
+    // Blocks contain others up to their own end word.
     let start = parser.span();
     let end = |parser: &mut Parser, word: &str| end_of_block(parser, start, word);
     let action = match word {

@@ -1,4 +1,7 @@
 //! State of the controller: system variables, tools and bases, and frames as values.
+//!
+//! Frames are values with X, Y, Z in mm and A, B, C in degrees, as in KRL; [`frame_of`] reads them.
+//! Not here: conversion to poses (`common/frames`).
 
 use std::rc::Rc;
 

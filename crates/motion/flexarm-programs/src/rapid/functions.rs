@@ -1,4 +1,8 @@
 //! RAPID functions of numbers, frames and targets, and operators on positions and texts.
+//!
+//! Start at [`function`]. Values are as RAPID has them, in mm, degrees and quaternions; [`pose_mm`]
+//! converts a record to a pose whose translation is still in mm. Not here: moves (`motion`), which
+//! convert to m.
 
 use std::rc::Rc;
 
@@ -191,6 +195,7 @@ fn geometry(
     let at = |k: usize| argument(values, k, name, span);
     let vector = |k: usize| position(Some(at(k)?), span);
     let is_given = |name: &str| arguments.iter().any(|argument| argument.name.as_deref() == Some(name));
+    // Poses, orientations, frames by points, vectors.
     Ok(Some(match name {
         "posemult" => {
             let (a, b) = (typed(machine, "pose", at(0)?.clone(), span)?, typed(machine, "pose", at(1)?.clone(), span)?);
@@ -259,6 +264,7 @@ fn mathematics(
         other => fail(span, format!("a text is expected, this is {}", other.kind())),
     };
     let at = |k: usize| argument(values, k, name, span)?.number(span);
+    // Numbers with angles in degrees, then texts and arrays.
     Ok(Value::Number(match name {
         "abs" | "dabs" => at(0)?.abs(),
         "sqrt" => at(0)?.sqrt(),

@@ -1,8 +1,13 @@
 //! Moves (MoveAbsJ, MoveJ, MoveL, MoveC and their variants) and the settings that affect them.
+//!
+//! Start at [`motion`]. RAPID writes mm, degrees and quaternions; here m and rad. `X_WO` is the
+//! pose of the work object in the world, `X_WB` with the program displacement in addition, `X_FT`
+//! the tool on the flange. Not here: data types (`types`), other instructions (`mod.rs`), syntax
+//! (`parse`).
 
 use std::rc::Rc;
 
-use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Speed, Target};
+use flexarm_path::program::{Blend, Configuration, Move, MoveKind, Selection, Speed, Target};
 use flexarm_settings::Place;
 use flexarm_spatial::Pose;
 use nalgebra::Translation3;
@@ -90,6 +95,7 @@ fn places(name: &str) -> Option<Places> {
 /// Runs a move; `false` if the instruction is not a move.
 pub(super) fn motion(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<bool> {
     let Some(places) = places(name) else { return Ok(false) };
+    // Options and variants that act on more than the path.
     for argument in arguments {
         match argument.name.as_deref() {
             Some("corr") => {
@@ -107,6 +113,7 @@ pub(super) fn motion(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument
     } else if !matches!(name, "moveabsj" | "movej" | "movel" | "movec") {
         machine.recorder.note("switching on the path is not simulated", span);
     }
+    // Frames, target, speed and zone, then the move with the places of its literals.
     let (X_WO, X_FT) = frames(machine, arguments, places.tool, span)?;
     let X_WB = X_WO * machine.dialect.settings.displacement;
     let (value, at) = machine.argument(arguments, places.target, span)?;
@@ -264,9 +271,9 @@ fn pose(machine: &mut Rapids<'_>, value: Value, kind: &MoveKind, span: Span) -> 
                 *number = i32::try_from(count)
                     .or_else(|_| fail(span, format!("confdata has {count}, expected quarter turns of an axis")))?;
             }
-            Configuration::Abb { quadrants: [numbers[0], numbers[1], numbers[2]], cfx: numbers[3] }
+            Configuration::Selected(Selection::Abb { quadrants: [numbers[0], numbers[1], numbers[2]], cfx: numbers[3] })
         }
-        _ => Configuration::Nearest,
+        _ => Configuration::NEAREST,
     };
     Ok(Target::Pose { X_BT, configuration })
 }
@@ -334,6 +341,7 @@ fn has(arguments: &[Argument], name: &str) -> bool {
 
 /// Runs an instruction that affects later moves; `false` if it is not one.
 pub(super) fn setting(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<bool> {
+    // Settings that are kept until they are set again, then instructions that are not simulated.
     match name {
         "confj" => machine.dialect.settings.check_joint_configuration = !has(arguments, "off"),
         "confl" => machine.dialect.settings.check_line_configuration = !has(arguments, "off"),

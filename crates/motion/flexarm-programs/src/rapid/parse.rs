@@ -1,4 +1,8 @@
 //! Parser of RAPID text. An unsupported statement is an error only where it is reached.
+//!
+//! Start at [`parse`], which gives the routines, data and records of one file as a [`Unit`]. Not
+//! here: expressions ([`crate::common::expressions`]), meaning of data types (`types`) and
+//! instructions (`mod.rs`).
 
 use std::collections::HashSet;
 use std::rc::Rc;

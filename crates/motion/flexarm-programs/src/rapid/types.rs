@@ -1,4 +1,8 @@
 //! RAPID data types, and the predefined speeds, zones, tool and work object of every controller.
+//!
+//! A type is a list of named fields; [`coerce`] makes a record of a list by them. Predefined data
+//! have the values of the manual, in mm, mm/s and degrees. Not here: records that a program defines
+//! itself (`parse`).
 
 use std::collections::HashMap;
 use std::rc::Rc;

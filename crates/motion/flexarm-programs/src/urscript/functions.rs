@@ -1,4 +1,7 @@
 //! URScript functions of numbers and poses.
+//!
+//! Start at [`function`]. Poses are lists `p[x, y, z, rx, ry, rz]` in m and rotation vectors in
+//! rad. Not here: moves and instructions (`mod.rs`).
 
 use flexarm_spatial::Pose;
 use nalgebra::Rotation3;

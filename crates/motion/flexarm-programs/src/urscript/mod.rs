@@ -219,11 +219,11 @@ fn number(machine: &mut UrScripts<'_>, arguments: &[Argument], position: usize, 
 fn target(value: Value, span: Span) -> Result<Target> {
     match value.known(span)? {
         Value::Pose(pose) => {
-            Ok(Target::Pose { X_BT: pose_rotation_vector(pose), configuration: Configuration::Nearest })
+            Ok(Target::Pose { X_BT: pose_rotation_vector(pose), configuration: Configuration::NEAREST })
         }
         Value::Inverse(inner) => {
             let (pose, near) = *inner;
-            let configuration = near.map_or(Configuration::Nearest, Configuration::Near);
+            let configuration = near.map_or(Configuration::NEAREST, Configuration::Near);
             Ok(Target::Pose { X_BT: pose_rotation_vector(pose), configuration })
         }
         list @ Value::List(_) => {

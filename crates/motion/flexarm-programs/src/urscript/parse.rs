@@ -1,4 +1,8 @@
 //! Parser of URScript text. An unsupported statement is an error only where it is reached.
+//!
+//! Start at [`parse`], which gives the routines and the main statements of one file as a [`Unit`].
+//! Blocks begin with a colon and end with `end`. Not here: expressions
+//! ([`crate::common::expressions`]).
 
 use std::rc::Rc;
 
@@ -163,6 +167,7 @@ impl Reader {
         }
         self.parser.take_symbol(":");
         let span = start.to(self.parser.last_span());
+        // The body may define routines of its own; they follow this one in the list.
         let depth = self.depth;
         self.depth += 1;
         let place = self.unit.routines.len();
@@ -216,6 +221,7 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
         }
         _ => {}
     }
+    // An assignment or a call.
     let place = parser.expression()?;
     if parser.take_symbol("=") {
         return Ok(Action::Assign { place, value: parser.expression()? });

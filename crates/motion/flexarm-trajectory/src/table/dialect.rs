@@ -1,4 +1,7 @@
-//! Dialects of tables: lines, field separators, and numbers with decimal points or commas.
+//! Dialects of tables: field separators, numbers with decimal points or commas, and clock times.
+//!
+//! Times are read twice: as f64, and exactly in units of 1e-12 s, since seconds since 1970 with
+//! nanoseconds have more digits than an f64. Not here: names and units of columns (`header`).
 
 use std::borrow::Cow;
 

@@ -1,4 +1,7 @@
 //! Interpretation of column names: joint or time, position or rate, and the unit.
+//!
+//! Start at [`name_and_unit`], then [`meaning`]. A unit is a factor to SI units, with the number of
+//! times that it is per second. Not here: which columns are used (`layout`).
 
 use std::f64::consts::PI;
 

@@ -1,19 +1,23 @@
 //! Assignment of the columns of a table to the time and the joints.
-
-use flexarm_settings::Setting;
+//!
+//! A [`Layout`] has three sources: the table is that of a run ([`Table::of_run`]), the user names
+//! the columns ([`Table::mapped`]), or the header does ([`Table::guessed`]). Each column in use
+//! gets a factor to SI units. Columns are counted from 0 here and from 1 in messages. Not here:
+//! meaning of single names (`header`), values (`rows`).
 
 use std::collections::BTreeSet;
+
+use flexarm_settings::{Finding, Setting};
 
 use super::dialect::number;
 use super::header::{Meaning, Measure, Unit, meaning, name_and_unit};
 use super::lines::{Table, run_joint};
-use super::located::{Located, at, at_field, nowhere};
 use super::request::TableRequest;
 use crate::column_map::ColumnMap;
+use crate::error::list;
+use crate::findings::{self, contradicting_units, fault, first_names, repeated_column, unknown_unit};
 use crate::joint_names::{misspelt, misspelt_text, none_known_text};
-use crate::problem::{Problem, list};
 use crate::trajectory::StatedUnit;
-use crate::warning::Warning;
 
 /// A column in use.
 #[derive(Clone, Debug)]
@@ -29,7 +33,9 @@ pub(super) struct Layout {
     pub(super) time: usize,
     pub(super) time_unit: Option<Unit>,
     pub(super) used: Vec<Used>,
-    pub(super) notes: Vec<Warning>,
+    pub(super) notes: Vec<Finding>,
+    /// Columns that are not of the motion.
+    pub(super) dropped: Vec<String>,
     /// Joints whose unit is not given anywhere.
     pub(super) assumed: Vec<String>,
     /// Units that comments give to joints.
@@ -38,8 +44,8 @@ pub(super) struct Layout {
 
 impl Layout {
     fn new(time: usize, time_unit: Option<Unit>) -> Self {
-        let (used, notes, assumed, stated) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        Self { time, time_unit, used, notes, assumed, stated }
+        let (used, notes, dropped) = (Vec::new(), Vec::new(), Vec::new());
+        Self { time, time_unit, used, notes, dropped, assumed: Vec::new(), stated: Vec::new() }
     }
 
     pub(super) fn find(&self, joint: &str, order: usize) -> Option<&Used> {
@@ -49,7 +55,7 @@ impl Layout {
 
 impl Table<'_> {
     /// Layout of `run.csv`.
-    pub(super) fn of_run(&self) -> Result<Layout, Located> {
+    pub(super) fn of_run(&self) -> Result<Layout, Box<Finding>> {
         let place = |name: &str| self.names.iter().position(|own| own == name);
         let used = self.names.iter().enumerate().filter_map(|(place, name)| {
             let (joint, _) = run_joint(name)?;
@@ -57,14 +63,16 @@ impl Table<'_> {
         });
         let time = place("time").ok_or_else(|| self.no_time())?;
         let seconds = Unit { measure: Measure::Time, per_s: 0, scale: 1.0 };
-        let notes = vec![Warning::PositionsOfRun];
+        let message = "the positions are those of the flexible robot of a run: where its drives give way, they \
+                       include what the gearboxes twist; the motion file of the run has the commanded ones";
+        let notes = vec![Finding::warning("table-of-run", self.file.to_string(), message, "")];
         Ok(Layout { used: used.collect(), notes, ..Layout::new(time, Some(seconds)) })
     }
 
-    fn no_time(&self) -> Located {
-        at(
+    fn no_time(&self) -> Box<Finding> {
+        self.at(
             self.header_line,
-            Problem::new(
+            fault(
                 "no-time-column",
                 format!(
                     "no column of the header {} is a time (`time`, `t`, `Time[s]`, `timestamp`); rename one, or tell \
@@ -77,7 +85,7 @@ impl Table<'_> {
     }
 
     /// Layout given by the user.
-    pub(super) fn mapped(&self, map: &ColumnMap, request: &TableRequest<'_>) -> Result<Layout, Located> {
+    pub(super) fn mapped(&self, map: &ColumnMap, request: &TableRequest<'_>) -> Result<Layout, Box<Finding>> {
         let (time, time_unit) = match &map.time {
             Some(column) => self.column(column)?,
             None => self.only_time(request)?,
@@ -91,8 +99,8 @@ impl Table<'_> {
         for (joint, column) in &map.joints {
             let (place, unit) = self.column(column)?;
             if !taken.insert(place) {
-                let problem = Problem::repeated_column(&self.shown(place), place + 1);
-                return Err(at_field(self.header_line, place, problem));
+                let problem = repeated_column(&self.shown(place), place + 1);
+                return Err(self.at_column(place, problem));
             }
             self.add(&mut layout, request, joint, place, unit)?;
         }
@@ -100,7 +108,7 @@ impl Table<'_> {
     }
 
     /// Layout according to the header.
-    pub(super) fn guessed(&self, request: &TableRequest<'_>) -> Result<Layout, Located> {
+    pub(super) fn guessed(&self, request: &TableRequest<'_>) -> Result<Layout, Box<Finding>> {
         let known = |name: &str| request.joints.is_none_or(|joints| joints.iter().any(|joint| joint.name == name));
         let (time, time_unit) = self.only_time(request)?;
         let mut layout = Layout::new(time, time_unit);
@@ -126,12 +134,12 @@ impl Table<'_> {
                 Some(joint) if known(&joint) && (is_own || is_numeric()) => {
                     if let Some(found) = unknown {
                         let accepted = "rad, deg, m, mm, and rates of them";
-                        let problem = Problem::unknown_unit("column", &found, accepted);
-                        return Err(at_field(self.header_line, place, problem));
+                        let problem = unknown_unit("column", &found, accepted);
+                        return Err(self.at_column(place, problem));
                     }
                     if let Some(used) = layout.find(&joint, order) {
-                        let problem = Problem::repeated_column(&joint, used.place + 1);
-                        return Err(at_field(self.header_line, place, problem));
+                        let problem = repeated_column(&joint, used.place + 1);
+                        return Err(self.at_column(place, problem));
                     }
                     self.add_order(&mut layout, request, &joint, place, unit, order)?;
                 }
@@ -141,8 +149,15 @@ impl Table<'_> {
         dropped.sort_by_key(|(place, _)| *place);
         self.check_names(&layout, &dropped, request)?;
         if !dropped.is_empty() {
-            let columns = dropped.iter().map(|(place, _)| self.shown(*place)).collect();
-            layout.notes.push(Warning::DroppedColumns { columns });
+            layout.dropped = dropped.iter().map(|(place, _)| self.shown(*place)).collect();
+            let message = format!(
+                "columns that are not of the motion are left out: {}; {} says which column is which joint",
+                first_names(&layout.dropped),
+                Setting::Columns
+            );
+            let header = self.file.line(self.header_line).to_string();
+            let warning = Finding::warning("table-columns", header, message, "");
+            layout.notes.push(warning.mended_by(&[Setting::Columns]));
         }
         Ok(layout)
     }
@@ -153,8 +168,9 @@ impl Table<'_> {
         layout: &Layout,
         dropped: &[(usize, Option<(String, usize)>)],
         request: &TableRequest<'_>,
-    ) -> Result<(), Located> {
+    ) -> Result<(), Box<Finding>> {
         let joints: Vec<&str> = request.joints.unwrap_or_default().iter().map(|joint| joint.name).collect();
+        // Columns left out whose names are close to those of joints without a column.
         for (place, name) in dropped {
             let Some((name, order)) = name else { continue };
             let unnamed: Vec<&str> =
@@ -162,8 +178,8 @@ impl Table<'_> {
             if let Some((found, meant)) = misspelt([name.as_str()], &unnamed) {
                 let by_column =
                     format!(", say which column it is ({} {meant}={})", Setting::Columns, self.shown(*place));
-                let problem = Problem::new("misspelt-joint", misspelt_text(found, &meant, &by_column));
-                return Err(at_field(self.header_line, *place, problem));
+                let problem = fault("misspelt-joint", misspelt_text(found, &meant, &by_column));
+                return Err(self.at_column(*place, problem));
             }
         }
         if let Some(rate) = layout.used.iter().find(|used| layout.find(&used.joint, 0).is_none()) {
@@ -173,13 +189,13 @@ impl Table<'_> {
                  the name",
                 list(&found)
             );
-            return Err(at_field(self.header_line, rate.place, Problem::new("no-position-column", message)));
+            return Err(self.at_column(rate.place, fault("no-position-column", message)));
         }
         if !layout.used.is_empty() {
             return Ok(());
         }
         let by_column = format!(", or name the columns: {} <joint>=<column>", Setting::Columns);
-        Err(at(self.header_line, Problem::new("no-joint", none_known_text(&self.names, &joints, &by_column))))
+        Err(self.at(self.header_line, fault("no-joint", none_known_text(&self.names, &joints, &by_column))))
     }
 
     /// Joint, order, unit and unknown unit of a column; the joint is `None` if the column is not
@@ -219,7 +235,7 @@ impl Table<'_> {
     }
 
     /// The only time column.
-    fn only_time(&self, request: &TableRequest<'_>) -> Result<(usize, Option<Unit>), Located> {
+    fn only_time(&self, request: &TableRequest<'_>) -> Result<(usize, Option<Unit>), Box<Finding>> {
         let mut found = Vec::new();
         let is_joint = |name: &str| request.joints.is_some_and(|joints| joints.iter().any(|joint| joint.name == name));
         for (place, column) in self.names.iter().enumerate().filter(|(_, column)| !is_joint(column)) {
@@ -234,9 +250,9 @@ impl Table<'_> {
             [] => Err(self.no_time()),
             _ => {
                 let columns: Vec<String> = found.iter().map(|(place, _)| self.names[*place].clone()).collect();
-                Err(at(
+                Err(self.at(
                     self.header_line,
-                    Problem::new(
+                    fault(
                         "several-times",
                         format!(
                             "the columns {} are all times; name the one that counts: {} t=<column>,<joint>=<column>",
@@ -251,18 +267,16 @@ impl Table<'_> {
 
     /// The column that a text refers to: by number, full name, name without its unit, or name with
     /// another unit.
-    fn column(&self, asked: &str) -> Result<(usize, Option<Unit>), Located> {
+    fn column(&self, asked: &str) -> Result<(usize, Option<Unit>), Box<Finding>> {
         let (bare, stated, unknown) = name_and_unit(asked);
         let missing = || {
             let (asked, found) = (asked.to_owned(), self.names.clone());
-            at(
+            self.at(
                 self.header_line,
-                Problem::new(
-                    "no-such-column",
-                    format!("there is no column {asked:?}; the header has {}", list(&found)),
-                ),
+                fault("no-such-column", format!("there is no column {asked:?}; the header has {}", list(&found))),
             )
         };
+        // By number, by the whole name, then by a name without its unit, which must be unique.
         if let Some(digits) = bare.strip_prefix('#') {
             let place: usize = digits.trim().parse().map_err(|_| missing())?;
             let place = place.checked_sub(1).filter(|place| *place < self.names.len()).ok_or_else(missing)?;
@@ -273,7 +287,7 @@ impl Table<'_> {
         }
         if let (Some(found), false) = (unknown, self.names.iter().any(|name| name_and_unit(name).0 == bare)) {
             let accepted = "s, ms, us, ns, min, rad, deg, mrad, m, mm";
-            return Err(nowhere(Problem::unknown_unit("columns", &found, accepted)));
+            return Err(findings::at(&self.file, unknown_unit("columns", &found, accepted)));
         }
         let matching = |name: &String| *name == bare || name_and_unit(name).0 == bare;
         let places: Vec<usize> = (0..self.names.len()).filter(|place| matching(&self.names[*place])).collect();
@@ -282,9 +296,9 @@ impl Table<'_> {
             [] => Err(missing()),
             _ => {
                 let columns: Vec<String> = places.iter().map(|place| self.names[*place].clone()).collect();
-                Err(at(
+                Err(self.at(
                     self.header_line,
-                    Problem::new(
+                    fault(
                         "ambiguous-column",
                         format!(
                             "{asked:?} could be each of the columns {}; give the whole name, or its number as in #2",
@@ -305,18 +319,15 @@ impl Table<'_> {
         if name.is_empty() { format!("#{}", place + 1) } else { name.clone() }
     }
 
-    fn bad_unit(&self, column: String, unit: Unit, expected: &'static str) -> Located {
+    fn bad_unit(&self, column: String, unit: Unit, expected: &'static str) -> Box<Finding> {
         let found = match unit.measure {
             Measure::Time => "a time",
             Measure::Angle => "an angle",
             Measure::Length => "a length",
         };
-        at(
+        self.at(
             self.header_line,
-            Problem::new(
-                "wrong-measure",
-                format!("the column {column:?} has the unit of {found}; expected {expected}"),
-            ),
+            fault("wrong-measure", format!("the column {column:?} has the unit of {found}; expected {expected}")),
         )
     }
 
@@ -327,7 +338,7 @@ impl Table<'_> {
         joint: &str,
         place: usize,
         unit: Option<Unit>,
-    ) -> Result<(), Located> {
+    ) -> Result<(), Box<Finding>> {
         // `joint_1.vel=...` refers to a rate.
         let (joint, order) = match meaning(joint, None) {
             Meaning::Joint(base, order) if order > 0 => (base, order),
@@ -344,7 +355,7 @@ impl Table<'_> {
         place: usize,
         unit: Option<Unit>,
         order: usize,
-    ) -> Result<(), Located> {
+    ) -> Result<(), Box<Finding>> {
         let known = request.joints.and_then(|joints| joints.iter().find(|known| known.name == joint));
         let metres = self.metres.iter().find(|(_, name)| name == joint).map(|(line, _)| *line);
         let is_prismatic = known.map(|known| known.is_prismatic).or(metres.map(|_| true));
@@ -361,8 +372,8 @@ impl Table<'_> {
             let stated = self.degrees.filter(|_| unit.measure == Measure::Angle);
             if stated.is_some_and(|(_, degrees)| degrees != (unit.scale != 1.0)) {
                 let (first, second) = if unit.scale == 1.0 { ("deg", "rad") } else { ("rad", "deg") };
-                let problem = Problem::contradicting_units(first, second);
-                return Err(at_field(self.header_line, place, problem));
+                let problem = contradicting_units(first, second);
+                return Err(self.at_column(place, problem));
             }
         }
         let mut state = |is_length, line| {

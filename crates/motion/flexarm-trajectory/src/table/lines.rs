@@ -1,15 +1,20 @@
 //! Header, separator and lines of a table, and the units that its comments state.
+//!
+//! Start at [`Table::find`]: it looks for the separator with which the lines below the header have
+//! as many fields as the header. Lines are counted from 1. Not here: which column is which joint
+//! (`layout`), numbers (`dialect`).
 
-use flexarm_settings::Setting;
+use flexarm_settings::{Finding, Place, Setting};
 
 use super::dialect::{Separator, clock_time, number};
 use super::header::{Measure, Unit, name_and_unit, unit};
-use super::located::{Located, at, nowhere};
 use super::request::TableRequest;
-use crate::problem::Problem;
+use crate::findings::{self, bad_value, fault, unknown_unit};
 
 /// The lines of a table.
 pub(super) struct Table<'t> {
+    pub(super) text: &'t str,
+    pub(super) file: Place,
     pub(super) separator: Separator,
     pub(super) header_line: usize,
     pub(super) names: Vec<String>,
@@ -37,15 +42,15 @@ fn is_comment(line: &str) -> bool {
 
 impl<'t> Table<'t> {
     /// Finds header and separator.
-    pub(super) fn find(text: &'t str, request: &TableRequest<'_>) -> Result<Self, Located> {
+    ///
+    /// * `file`: place for messages.
+    pub(super) fn find(text: &'t str, file: Place, request: &TableRequest<'_>) -> Result<Self, Box<Finding>> {
         let ends_whole = text.ends_with(['\n', '\r']);
         let lines = || text.split(['\n']).map(|line| line.trim_end_matches('\r')).enumerate().map(|(i, l)| (i + 1, l));
         let mut content = lines().filter(|(_, line)| !line.trim().is_empty() && !is_comment(line));
         let Some((first_line, first)) = content.next() else {
-            return Err(nowhere(Problem::new(
-                "empty",
-                "the file is empty; expected a header `time,<joint>,...` and at least two rows",
-            )));
+            let message = "the file is empty; expected a header `time,<joint>,...` and at least two rows";
+            return Err(findings::at(&file, fault("empty", message)));
         };
         let second = content.next();
         // In a file without a header line the last comment before the numbers may be the header, as
@@ -73,7 +78,7 @@ impl<'t> Table<'t> {
                          or tell the columns by number: {} t=#1[s],<joint>=#2[rad]",
                         Setting::Columns
                     );
-                    return Err(at(first_line, Problem::new("no-header", message)));
+                    return Err(findings::at(&file.line(first_line), fault("no-header", message)));
                 }
             }
         } else {
@@ -96,6 +101,8 @@ impl<'t> Table<'t> {
             lines.remove(0);
         }
         let mut table = Self {
+            text,
+            file,
             separator,
             header_line,
             names,
@@ -107,37 +114,59 @@ impl<'t> Table<'t> {
             ends_whole,
             preamble,
         };
-        table.read_comments(text)?;
+        table.read_comments()?;
         Ok(table)
     }
 
+    /// Adds the place of a line to an error.
+    pub(super) fn at(&self, line: usize, fault: Box<Finding>) -> Box<Finding> {
+        findings::at(&self.file.line(line), fault)
+    }
+
+    /// Adds the place of a field, from 0, in a line to an error.
+    pub(super) fn at_field(&self, line: usize, field: usize, fault: Box<Finding>) -> Box<Finding> {
+        findings::at(&self.place(line, field), fault)
+    }
+
+    /// Adds the place of a column, from 0, in the header to an error.
+    pub(super) fn at_column(&self, column: usize, fault: Box<Finding>) -> Box<Finding> {
+        self.at_field(self.header_line, column, fault)
+    }
+
+    /// Place of a field, from 0, in a line.
+    pub(super) fn place(&self, line: usize, field: usize) -> Place {
+        let column = self.text.lines().nth(line - 1).and_then(|text| self.separator.column(text, field));
+        Place { column, ..self.file.line(line) }
+    }
+
     /// Reads the units that comments state.
-    fn read_comments(&mut self, text: &str) -> Result<(), Located> {
-        for (i, line) in text.lines().enumerate().filter(|(_, line)| line.starts_with('#')) {
+    fn read_comments(&mut self) -> Result<(), Box<Finding>> {
+        for (i, line) in self.text.lines().enumerate().filter(|(_, line)| line.starts_with('#')) {
             let Some((key, value)) = line[1..].split_once(':') else { continue };
+            // Comments with other keys, or other units of time, say nothing here.
             let (line, value) = (i + 1, value.trim());
             match (key.trim(), value) {
                 ("unit", "rad" | "deg") => {
                     let degrees = value == "deg";
                     if self.degrees.is_some_and(|(_, before)| before != degrees) {
                         let first = if degrees { "rad" } else { "deg" };
-                        return Err(at(line, Problem::contradicting_units(first, value)));
+                        return Err(self.at(line, findings::contradicting_units(first, value)));
                     }
                     self.degrees = Some((line, degrees));
                 }
                 ("unit", found) => {
-                    return Err(at(line, Problem::unknown_unit("unit", found, "rad, deg")));
+                    return Err(self.at(line, unknown_unit("unit", found, "rad, deg")));
                 }
                 ("metres", names) => {
                     self.metres.extend(names.split(',').map(|name| (line, name.trim().to_owned())));
                 }
                 ("cutoff", found) => {
                     let hz = found.strip_suffix("Hz").and_then(|number| number.trim().parse().ok());
-                    let wrong = || at(line, Problem::value("cutoff", found, "Hz, such as 20 Hz"));
+                    let wrong = || self.at(line, bad_value("cutoff", found, "Hz, such as 20 Hz"));
                     self.cutoff = Some((line, hz.ok_or_else(wrong)?));
                 }
                 ("time", found) if found != "s" && unit(found).is_none_or(|unit| unit.measure == Measure::Time) => {
-                    return Err(at(line, Problem::unknown_unit("time", found, "s")));
+                    return Err(self.at(line, unknown_unit("time", found, "s")));
                 }
                 _ => {}
             }

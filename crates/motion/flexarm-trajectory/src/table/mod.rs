@@ -11,7 +11,8 @@
 //! ```
 //!
 //! What the table leaves open is either given by the user ([`crate::ColumnMap`]) or assumed, with a
-//! [`Warning`]. A table with a column `time` and no units in its header is in s and rad.
+//! warning ([`Trajectory::warnings`]). A table with a column `time` and no units in its header is
+//! in s and rad.
 //!
 //! * Three comments have a meaning: `# unit: rad` or `# unit: deg` for all joints, with `deg/s` and
 //!   `deg/s²` for rates; `# metres: joint_x, joint_y` names prismatic joints, whose columns are in m
@@ -33,23 +34,20 @@ mod dialect;
 mod header;
 mod layout;
 mod lines;
-mod located;
 pub(crate) mod request;
 mod rows;
 
-use flexarm_settings::Setting;
+use flexarm_settings::{Finding, Place, Setting};
 
 use self::dialect::Separator;
 use self::header::{Measure, Unit};
 use self::layout::Layout;
 use self::lines::Table;
-use self::located::{Located, at, at_field};
 use self::rows::{Rows, joints};
-use crate::error::TrajectoryError;
-use crate::problem::{Problem, SampleError};
+use crate::error::{SampleError, TrajectoryError};
+use crate::findings::{self, fault};
 use crate::spline::{Samples, not_increasing};
 use crate::trajectory::Trajectory;
-use crate::warning::Warning;
 
 pub use self::request::{KnownJoint, TableRequest};
 
@@ -83,13 +81,7 @@ impl Trajectory {
         // Line ends of old Macintosh files.
         let with_ends = (text.contains('\r') && !text.contains('\n')).then(|| text.replace('\r', "\n"));
         let text = with_ends.as_deref().unwrap_or(text);
-        let failed = |Located { line, field, mut problem, more_lines }: Located, separator: Separator| {
-            let place = |(line, field): (usize, usize)| separator.column(text.lines().nth(line - 1)?, field);
-            problem.message += &further(&more_lines);
-            problem.at(origin, line, line.zip(field).and_then(place))
-        };
-        let table = Table::find(text, request).map_err(|error| failed(error, Separator::Comma))?;
-        table.read(request).map_err(|error| failed(error, table.separator))
+        Ok(Table::find(text, Place::of_file(origin), request)?.read(request)?)
     }
 
     /// As [`Trajectory::parse_table`], for a table whose header names time and joints.
@@ -101,26 +93,31 @@ impl Trajectory {
     }
 }
 
-/// Text about further lines that are wrong; the first ten are named.
-fn further(lines: &[usize]) -> String {
-    let named: Vec<String> = lines.iter().take(10).map(usize::to_string).collect();
-    match lines.len() {
-        0 => String::new(),
-        1 => format!(" (line {} is wrong, too)", named[0]),
-        count => {
-            let rest = if count > named.len() { ", ..." } else { "" };
-            format!(" ({count} more lines are wrong: {}{rest})", named.join(", "))
-        }
-    }
-}
+/// Maximum number of further places that an error names.
+const MAX_PLACES: usize = 3;
 
 impl Table<'_> {
-    fn read(&self, request: &TableRequest<'_>) -> Result<(Trajectory, TableInfo), Located> {
+    /// Adds the places of further wrong lines to an error; the first few are named.
+    fn with_further(&self, mut first: Box<Finding>, lines: &[usize]) -> Box<Finding> {
+        let named: Vec<String> = lines.iter().take(MAX_PLACES).map(|l| self.file.line(*l).to_string()).collect();
+        first.message += &match lines.len() {
+            0 => String::new(),
+            1 => format!(" ({} is wrong, too)", named[0]),
+            count => {
+                let rest = if count > named.len() { ", ..." } else { "" };
+                format!(" ({count} more lines are wrong: {}{rest})", named.join(", "))
+            }
+        };
+        first
+    }
+
+    fn read(&self, request: &TableRequest<'_>) -> Result<(Trajectory, TableInfo), Box<Finding>> {
         let mut layout = match (request.columns, self.is_run()) {
             (Some(map), _) => self.mapped(map, request)?,
             (None, true) => self.of_run()?,
             (None, false) => self.guessed(request)?,
         };
+        // Values of the columns in use; times in s from the first row.
         self.check_metres(&layout)?;
         let (rows, is_own) = (self.rows(&layout)?, self.is_own(request));
         if is_own {
@@ -133,24 +130,14 @@ impl Table<'_> {
         let mut samples = Samples { times, joints: joints(&layout, &rows) };
         if let Some((line, hz)) = self.cutoff {
             samples = samples.smoothed(hz).map_err(|error| match error {
-                SampleError::Cutoff { .. } => at(line, error.into()),
+                SampleError::Cutoff { .. } => self.at(line, TrajectoryError::from(error).into()),
                 _ => self.placed(error.into(), &layout, &rows),
             })?;
         }
+        // The curves, with what was assumed and left out.
         let trajectory = samples.interpolate().map_err(|error| self.placed(error, &layout, &rows))?;
         self.check_angles(&layout, &rows)?;
-        if !is_own && !layout.assumed.is_empty() {
-            layout.notes.push(Warning::AssumedRadians { joints: layout.assumed.clone() });
-        }
-        if let Some((first, last)) = self.preamble {
-            layout.notes.push(Warning::Preamble { first, last });
-        }
-        if rows.repeated > 0 {
-            layout.notes.push(Warning::RepeatedRows { count: rows.repeated });
-        }
-        if rows.cut {
-            layout.notes.push(Warning::CutRow { line: self.lines.last().map_or(0, |(line, _)| *line) });
-        }
+        layout.notes.extend(self.warnings(&layout, &rows, is_own));
         let decimals = if rows.comma { ", decimal commas" } else { "" };
         let kind = if self.is_run() && request.columns.is_none() { "table of a run" } else { "table" };
         let format = match is_own && self.separator == Separator::Comma {
@@ -158,14 +145,45 @@ impl Table<'_> {
             false => format!("{kind}, {}{decimals}", self.separator.in_words()),
         };
         let trajectory = layout.notes.into_iter().fold(trajectory, Trajectory::with_note);
-        let trajectory = trajectory.with_stated_units(layout.stated);
+        let trajectory = trajectory.with_stated_units(layout.stated).with_dropped_columns(layout.dropped);
         Ok((trajectory, TableInfo { format, rows: rows.times.len() }))
     }
 }
 
 impl Table<'_> {
+    /// Warnings about assumptions and about lines that are left out.
+    fn warnings(&self, layout: &Layout, rows: &Rows, is_own: bool) -> Vec<Finding> {
+        let mut warnings = Vec::new();
+        let mut warn = |code: &str, line: usize, message: String| {
+            warnings.push(Finding::warning(code, self.file.line(line).to_string(), message, ""));
+        };
+        if !is_own && !layout.assumed.is_empty() {
+            let joints = findings::first_names(&layout.assumed);
+            let message = format!(
+                "the table does not state the unit of {joints}: taken as rad; name it in the header, as in joint_1[deg]"
+            );
+            warn("table-unit", self.header_line, message);
+        }
+        if let Some((first, last)) = self.preamble {
+            let count = last + 1 - first;
+            let lines = if count == 1 { "line is" } else { "lines are" };
+            warn("table-preamble", first, format!("{count} {lines} above the header and not used"));
+        }
+        if let Some(first) = rows.repeated.first() {
+            let count = rows.repeated.len();
+            let rows = if count == 1 { "row repeats" } else { "rows repeat" };
+            let message = format!("{count} {rows} the one before, with its time; left out, the first of them here");
+            warn("table-repeated-rows", *first, message);
+        }
+        if let Some((line, _)) = self.lines.last().filter(|_| rows.cut) {
+            let message = "the last row is not whole and is left out: the file was cut off; export it again";
+            warn("motion-cut", *line, message.to_owned());
+        }
+        warnings
+    }
+
     /// Rejects names of prismatic joints that the table does not have.
-    fn check_metres(&self, layout: &Layout) -> Result<(), Located> {
+    fn check_metres(&self, layout: &Layout) -> Result<(), Box<Finding>> {
         let is_used = |name: &str| layout.used.iter().any(|used| used.joint == name);
         let is_column = |name: &str| self.names.iter().any(|column| column == name);
         let Some((line, name)) = self.metres.iter().find(|(_, name)| !is_used(name) && !is_column(name)) else {
@@ -173,11 +191,11 @@ impl Table<'_> {
         };
         let joints: Vec<String> =
             layout.used.iter().filter(|used| used.order == 0).map(|used| used.joint.clone()).collect();
-        Err(at(*line, Problem::unknown_joint("metres", name, &joints)))
+        Err(self.at(*line, findings::unknown_joint("metres", name, &joints)))
     }
 
     /// Rejects angles too large for radians in a table that does not state its unit.
-    fn check_angles(&self, layout: &Layout, rows: &Rows) -> Result<(), Located> {
+    fn check_angles(&self, layout: &Layout, rows: &Rows) -> Result<(), Box<Finding>> {
         for (used, values) in layout.used.iter().zip(&rows.values) {
             let largest = values.iter().fold(0.0, |most: f64, q| most.max(q.abs()));
             if used.order == 0 && largest > SUSPICIOUS_ANGLE && layout.assumed.contains(&used.joint) {
@@ -188,7 +206,7 @@ impl Table<'_> {
                      above it, or with {} {joint}={column}[deg]",
                     Setting::Columns
                 );
-                return Err(at_field(self.header_line, used.place, Problem::new("unit-needed", message)));
+                return Err(self.at_column(used.place, fault("unit-needed", message)));
             }
         }
         Ok(())
@@ -207,32 +225,37 @@ impl Table<'_> {
         let dates = [(1e17, "ns since 1970", 1e-9), (1e14, "us since 1970", 1e-6), (1e11, "ms since 1970", 1e-3)];
         let (unit, scale) =
             dates.iter().find(|(from, ..)| first > *from).map_or(("s", 1.0), |(_, unit, scale)| (*unit, *scale));
-        layout.notes.push(Warning::AssumedTime { column: self.shown(layout.time), unit });
+        let column = self.shown(layout.time);
+        let message = format!(
+            "the table does not state the unit of its column {column:?}: taken as {unit}; name it in the header, as in \
+             Time[ms]"
+        );
+        let place = self.place(self.header_line, layout.time).to_string();
+        layout.notes.push(Finding::warning("table-time-unit", place, message, ""));
         scale
     }
 
     /// Adds the place in the file to an error in the samples.
-    fn placed(&self, error: TrajectoryError, layout: &Layout, rows: &Rows) -> Located {
-        match error {
-            TrajectoryError::Samples(error) => match &error {
-                SampleError::TimeNotIncreasing { row, .. } => {
-                    let first = rows.times.first().copied().unwrap_or_default();
-                    let times: Vec<f64> = rows.times.iter().map(|time| time.since(first)).collect();
-                    let more_lines = not_increasing(&times).filter(|k| k != row).map(|row| rows.lines[row]).collect();
-                    Located { more_lines, ..at_field(rows.lines[*row], layout.time, error.into()) }
-                }
-                SampleError::AccelerationWithoutVelocity { joint } => match layout.find(joint, 2) {
-                    Some(used) => at_field(self.header_line, used.place, error.into()),
-                    None => at(self.header_line, error.into()),
-                },
-                _ => at(self.header_line, error.into()),
-            },
-            TrajectoryError::OutOfRange { joint, time_s } => {
-                let first = rows.times.first().copied().unwrap_or_default();
-                let row = rows.times.iter().position(|t| t.since(first) >= time_s).unwrap_or(0);
-                at(rows.lines.get(row).copied().unwrap_or(self.header_line), Problem::out_of_range(&joint))
+    fn placed(&self, error: TrajectoryError, layout: &Layout, rows: &Rows) -> Box<Finding> {
+        let first = rows.times.first().copied().unwrap_or_default();
+        let times = || rows.times.iter().map(|time| time.since(first));
+        match &error {
+            TrajectoryError::Samples(SampleError::TimeNotIncreasing { row, .. }) => {
+                let times: Vec<f64> = times().collect();
+                let more: Vec<usize> = not_increasing(&times).filter(|k| k != row).map(|row| rows.lines[row]).collect();
+                self.with_further(self.at_field(rows.lines[*row], layout.time, error.into()), &more)
             }
-            other => at(self.header_line, Problem::new("toml", other.to_string())),
+            TrajectoryError::Samples(SampleError::AccelerationWithoutVelocity { joint }) => {
+                match layout.find(joint, 2) {
+                    Some(used) => self.at_column(used.place, error.into()),
+                    None => self.at(self.header_line, error.into()),
+                }
+            }
+            TrajectoryError::OutOfRange { time_s, .. } => {
+                let row = times().position(|t| t >= *time_s).unwrap_or(0);
+                self.at(rows.lines.get(row).copied().unwrap_or(self.header_line), error.into())
+            }
+            _ => self.at(self.header_line, error.into()),
         }
     }
 }

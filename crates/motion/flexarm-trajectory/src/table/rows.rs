@@ -1,10 +1,15 @@
 //! Values of the columns in use, row by row.
+//!
+//! Start at [`Table::rows`]. All wrong rows are found, not only the first. Values are in SI units
+//! by the factors of the layout; times stay as written, and their differences are exact. Not here:
+//! interpolation between the rows (`spline`).
+
+use flexarm_settings::Finding;
 
 use super::dialect::{Decimal, Separator, clock_time, exact, number};
 use super::layout::{Layout, Used};
 use super::lines::Table;
-use super::located::{Located, at, at_field};
-use crate::problem::Problem;
+use crate::findings::fault;
 use crate::spline::JointSamples;
 
 /// Maximum number of values kept.
@@ -40,28 +45,37 @@ pub(super) struct Rows {
     pub(super) lines: Vec<usize>,
     pub(super) times: Vec<Time>,
     pub(super) values: Vec<Vec<f64>>,
-    pub(super) repeated: usize,
+    /// Lines that repeat the row before, with its time.
+    pub(super) repeated: Vec<usize>,
+    /// Whether the last line is cut off.
     pub(super) cut: bool,
+    /// Whether numbers have decimal commas.
     pub(super) comma: bool,
     /// Whether times are times of day.
     pub(super) clock: bool,
 }
 
-/// First lines with a decimal point and with a decimal comma.
+/// Line and field of the first number with a decimal point, and of the first with a decimal comma.
 #[derive(Default)]
 struct Decimals {
-    point: Option<usize>,
-    comma: Option<usize>,
+    point: Option<(usize, usize)>,
+    comma: Option<(usize, usize)>,
 }
 
 impl Table<'_> {
-    pub(super) fn rows(&self, layout: &Layout) -> Result<Rows, Located> {
+    /// Reads all rows.
+    ///
+    /// # Errors
+    /// A finding at the first wrong row that names the others; one for numbers with both decimal
+    /// points and decimal commas; one for more numbers than fit into memory.
+    pub(super) fn rows(&self, layout: &Layout) -> Result<Rows, Box<Finding>> {
         let mut rows = Rows { values: vec![Vec::new(); layout.used.len()], ..Rows::default() };
         let mut decimals = Decimals::default();
-        let mut wrong: Option<Located> = None;
+        let mut wrong: Option<(Box<Finding>, Vec<usize>)> = None;
         let last = self.lines.last().map_or(0, |(line, _)| *line);
         let mut row = vec![0.0; layout.used.len()];
         for &(line, text) in &self.lines {
+            // An incomplete last row without a line end is the end of a recording that was cut off.
             let fields = self.fields(text);
             if line == last && !self.ends_whole && fields.len() < self.names.len() {
                 rows.cut = true;
@@ -72,20 +86,21 @@ impl Table<'_> {
                     rows.clock |= clock;
                     time
                 }
-                (Err(_), Some(first)) => {
-                    first.more_lines.push(line);
+                (Err(_), Some((_, more))) => {
+                    more.push(line);
                     continue;
                 }
                 (Err(error), None) => {
-                    wrong = Some(error);
+                    wrong = Some((error, Vec::new()));
                     continue;
                 }
             };
+            // A row that repeats the one before, with its time, says nothing.
             let is_same = |(values, value): (&Vec<f64>, &f64)| values.last() == Some(value);
             if rows.times.last().is_some_and(|last| time.since(*last) == 0.0)
                 && rows.values.iter().zip(&row).all(is_same)
             {
-                rows.repeated += 1;
+                rows.repeated.push(line);
                 continue;
             }
             if rows.times.len() >= MAX_NUMBERS / (layout.used.len() + 1) {
@@ -94,21 +109,24 @@ impl Table<'_> {
                      rows: splines pass between them",
                     most = MAX_NUMBERS
                 );
-                return Err(at(line, Problem::new("too-many-numbers", message)));
+                return Err(self.at(line, fault("too-many-numbers", message)));
             }
             rows.lines.push(line);
             rows.times.push(time);
             rows.values.iter_mut().zip(&row).for_each(|(values, value)| values.push(*value));
         }
-        if let Some(wrong) = wrong {
-            return Err(wrong);
+        if let Some((first, more)) = wrong {
+            return Err(self.with_further(first, &more));
         }
         if let (Some(point), Some(comma)) = (decimals.point, decimals.comma) {
             let message = format!(
-                "numbers have decimal points (line {point}) and decimal commas (line {comma}); write all in one way, \
-                 without separators of thousands"
+                "numbers have decimal points ({}) and decimal commas ({}); write all in one way, without separators of \
+                 thousands",
+                self.place(point.0, point.1),
+                self.place(comma.0, comma.1)
             );
-            return Err(at(point.max(comma), Problem::new("mixed-decimals", message)));
+            let (line, field) = point.max(comma);
+            return Err(self.at_field(line, field, fault("mixed-decimals", message)));
         }
         rows.comma = decimals.comma.is_some();
         Ok(rows)
@@ -133,11 +151,12 @@ impl Table<'_> {
         layout: &Layout,
         row: &mut [f64],
         decimals: &mut Decimals,
-    ) -> Result<(Time, bool), Located> {
+    ) -> Result<(Time, bool), Box<Finding>> {
+        // One field for each column.
         let (found, expected) = (fields.len(), self.names.len());
         if found != expected {
-            let problem = match self.separator {
-                Separator::Comma if found == 2 * expected => Problem::new(
+            let ragged = match self.separator {
+                Separator::Comma if found == 2 * expected => fault(
                     "decimal-commas",
                     format!(
                         "the row has {found} fields, the header {expected}: twice as many, as if numbers had decimal \
@@ -145,7 +164,7 @@ impl Table<'_> {
                          in numbers"
                     ),
                 ),
-                _ => Problem::new(
+                _ => fault(
                     "ragged",
                     format!(
                         "the row has {found} fields, the header {expected}; was the file cut off? complete or remove \
@@ -153,28 +172,24 @@ impl Table<'_> {
                     ),
                 ),
             };
-            return Err(at(line, problem));
+            return Err(self.at(line, ragged));
         }
-        let mut value = |place: usize| -> Result<f64, Located> {
+        // A number, of which the way decimals are written is remembered.
+        let mut value = |place: usize| -> Result<f64, Box<Finding>> {
             let field = &fields[place];
             let (value, decimal) = number(field).ok_or_else(|| {
                 let (column, found) = (self.shown(place), field.chars().take(40).collect::<String>());
-                at_field(
-                    line,
-                    place,
-                    Problem::new(
-                        "not-a-number",
-                        format!("{column}: {found:?} is not a number; expected one such as 0.25 or -1e-3"),
-                    ),
-                )
+                let message = format!("{column}: {found:?} is not a number; expected one such as 0.25 or -1e-3");
+                self.at_field(line, place, fault("not-a-number", message))
             })?;
             match decimal {
                 Decimal::None => {}
-                Decimal::Point => decimals.point = decimals.point.or(Some(line)),
-                Decimal::Comma => decimals.comma = decimals.comma.or(Some(line)),
+                Decimal::Point => decimals.point = decimals.point.or(Some((line, place))),
+                Decimal::Comma => decimals.comma = decimals.comma.or(Some((line, place))),
             }
             Ok(value)
         };
+        // The time, as a time of day or as a number, then the joints.
         let clock = clock_time(&fields[layout.time]);
         let time = match clock {
             Some(clock) => Time { value: clock as f64 / 1e12, exact: Some(clock) },

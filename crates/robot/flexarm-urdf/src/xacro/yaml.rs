@@ -51,7 +51,7 @@ impl Interpreter<'_> {
         Ok(root.unwrap_or(Value::None))
     }
 
-    fn value(&mut self, YamlNode { line, value }: YamlNode<'_>) -> Result<Value, Located> {
+    fn value(&mut self, YamlNode { line, value, .. }: YamlNode<'_>) -> Result<Value, Located> {
         let within = |error| located(line, error);
         self.charge(64).map_err(within)?;
         match value {

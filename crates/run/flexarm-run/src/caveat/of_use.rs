@@ -87,7 +87,10 @@ pub(crate) fn of_model(arm: &Arm) -> Vec<Finding> {
 /// Returns the caveats about a motion on a robot.
 pub fn of_motion(motion: &Motion, rigid: &Model) -> Vec<Finding> {
     let mut caveats = motion.caveats();
-    let passed = |v: &LimitViolation| Finding::warning("joint-limit", &v.joint, format!("joint limit: {v}"), "");
+    let passed = |v: &LimitViolation| {
+        let warning = v.warning();
+        Finding { message: format!("joint limit: {}", warning.message), ..warning }
+    };
     caveats.extend(motion.violations.iter().map(passed));
     caveats.extend(motion::of_motion(&motion.name, &motion.trajectory, rigid));
     caveats

@@ -30,8 +30,8 @@ pub struct Motion {
     pub violations: Vec<LimitViolation>,
     /// Unit error that would explain positions beyond their limits; empty if there is none.
     pub likely: &'static str,
-    /// Warnings.
-    pub warnings: Vec<String>,
+    /// Warnings about the trajectory; their messages start with the place in the file.
+    pub warnings: Vec<Finding>,
     /// Joints that the file does not contain.
     pub held: Vec<HeldJoint>,
     /// Planned moves, if the motion is given as a TCP path.
@@ -269,9 +269,8 @@ impl Motion {
 
     /// Returns the caveats about the motion.
     pub fn caveats(&self) -> Vec<Finding> {
-        let file = self.path.display().to_string();
-        let given = self.warnings.iter().map(|text| Finding::warning("trajectory", &file, text, ""));
-        self.notes.iter().cloned().chain(self.dropped_caveat()).chain(given).chain(self.held_caveats()).collect()
+        let read = self.notes.iter().cloned().chain(self.dropped_caveat());
+        read.chain(self.warnings.iter().cloned()).chain(self.held_caveats()).collect()
     }
 
     /// Warns about joints that the robot does not have.
@@ -306,7 +305,14 @@ impl Motion {
     }
 }
 
-/// Returns the warnings of a trajectory with its file.
-fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<String> {
-    trajectory.warnings().iter().map(|w| format!("{}: {w}", path.display())).collect()
+/// Returns the warnings about a trajectory with messages that start with the place in its file, or
+/// with the file.
+pub(crate) fn warnings(trajectory: &Trajectory, path: &Path) -> Vec<Finding> {
+    let file = path.display().to_string();
+    let placed = |found: Finding| {
+        let location = if found.location.is_empty() { file.clone() } else { found.location };
+        let place = if location.starts_with(&file) { &location } else { &file };
+        Finding { message: format!("{place}: {}", found.message), location, ..found }
+    };
+    trajectory.warnings().into_iter().map(placed).collect()
 }

@@ -8,8 +8,7 @@ use std::io::Read;
 use std::path::Path;
 
 use flexarm_motion_io::{
-    MCAP_MAGIC, MessageMotion, MotionError, Request, SQLITE_MAGIC, ZSTD_MAGIC, is_message_text, read_db3, read_folder,
-    read_mcap, read_packed, read_text,
+    MCAP_MAGIC, MessageMotion, MotionError, Request, SQLITE_MAGIC, ZSTD_MAGIC, is_message_text, read_bag, read_text,
 };
 use flexarm_settings::{Finding, Setting};
 use flexarm_trajectory::{ColumnMap, JointLimits, KnownJoint, TableRequest, Trajectory, text_of_file};
@@ -93,23 +92,15 @@ pub(crate) struct MotionFormat {
 
 /// Tried in order: formats with an unambiguous signature first, tables last.
 const FORMATS: [MotionFormat; 11] = [
-    MotionFormat { name: "folders of rosbag2", recognises: |head| head.is_folder, read: |file| bag(file, read_folder) },
-    MotionFormat {
-        name: "bags as MCAP",
-        recognises: |head| head.bytes.starts_with(MCAP_MAGIC),
-        read: |file| bag(file, read_mcap),
-    },
-    MotionFormat {
-        name: "bags as SQLite (.db3)",
-        recognises: |head| head.bytes.starts_with(SQLITE_MAGIC),
-        read: |file| bag(file, read_db3),
-    },
+    MotionFormat { name: "folders of rosbag2", recognises: |head| head.is_folder, read: bag },
+    MotionFormat { name: "bags as MCAP", recognises: |head| head.bytes.starts_with(MCAP_MAGIC), read: bag },
+    MotionFormat { name: "bags as SQLite (.db3)", recognises: |head| head.bytes.starts_with(SQLITE_MAGIC), read: bag },
     // Bags of ROS 1 are not read: an error of their own.
     MotionFormat { name: "", recognises: |head| head.bytes.starts_with(b"#ROSBAG V"), read: bag_of_ros_1 },
     MotionFormat {
         name: "MCAP and SQLite bags packed by zstd",
         recognises: |head| head.bytes.starts_with(ZSTD_MAGIC),
-        read: |file| bag(file, read_packed),
+        read: bag,
     },
     MotionFormat {
         name: "paths of the tool (TOML with [path])",
@@ -287,12 +278,9 @@ fn bag_of_ros_1(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     Err(Error::motion(file.path, what))
 }
 
-fn bag(
-    file: &MotionFile<'_>,
-    read: fn(&Path, &Request<'_>) -> Result<MessageMotion, MotionError>,
-) -> Result<ReadMotion, Error> {
+fn bag(file: &MotionFile<'_>) -> Result<ReadMotion, Error> {
     no_columns(file, "a bag")?;
-    with_request(file, |request| read(file.path, request))
+    with_request(file, |request| read_bag(file.path, request))
 }
 
 fn with_request(

@@ -18,7 +18,7 @@ use serde::Serialize;
 
 use crate::caveat;
 use crate::error::Error;
-use crate::motions::motion::Motion;
+use crate::motions::motion::{self, Motion};
 use crate::motions::motion_formats::{self, MotionFile, MotionOptions, ReadMotion};
 use crate::robot::{Robot, tcp_frame};
 
@@ -134,7 +134,7 @@ pub struct MotionViolation {
     pub value: f64,
     /// Limit.
     pub limit: f64,
-    /// `Display` of the [`LimitViolation`].
+    /// Message of [`LimitViolation::warning`].
     pub message: String,
 }
 
@@ -198,8 +198,8 @@ pub fn motion_report(
 fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajectory, Torques), Error> {
     let file = MotionFile { path, joints: None, limits: &[], options, cell: None, text: None };
     let ReadMotion { trajectory, format, topic, samples, dropped, caveats, .. } = motion_formats::read(&file)?;
-    let own = trajectory.warnings().iter().map(|warning| format!("{}: {warning}", path.display())).collect();
-    let (warnings, notes) = messages(&caveats, own);
+    let own = motion::warnings(&trajectory, path);
+    let (warnings, notes) = messages(&[caveats, own].concat());
     let peaks = trajectory.peak().iter().map(|peak| of_joint(peak, "rad or m", &JointLimits::UNLIMITED)).collect();
     let report = MotionReport {
         motion: path.display().to_string(),
@@ -218,13 +218,11 @@ fn alone(path: &Path, options: &MotionOptions) -> Result<(MotionReport, Trajecto
 }
 
 /// Splits caveats into the messages of warnings and of notes.
-fn messages(caveats: &[caveat::Finding], own: Vec<String>) -> (Vec<String>, Vec<String>) {
+fn messages(caveats: &[caveat::Finding]) -> (Vec<String>, Vec<String>) {
     let (notes, warnings): (Vec<_>, Vec<_>) =
         caveats.iter().partition(|caveat| caveat.severity == caveat::Severity::Note);
     let text = |caveats: Vec<&caveat::Finding>| caveats.into_iter().map(|c| c.message.clone()).collect::<Vec<_>>();
-    let mut warnings = text(warnings);
-    warnings.extend(own.into_iter().filter(|text| !warnings.contains(text)).collect::<Vec<_>>());
-    (warnings, text(notes))
+    (text(warnings), text(notes))
 }
 
 /// Reports on a motion of a robot.
@@ -238,7 +236,7 @@ fn on_robot(path: &Path, robot: &Robot, options: &MotionOptions) -> Result<(Moti
     let mut caveats = caveat::of_use::of_robot(robot)?;
     let violations = |caveat: &caveat::Finding| caveat.code == "joint-limit"; // in `violations`
     caveats.extend(caveat::of_use::of_motion(&motion, &model).into_iter().filter(|caveat| !violations(caveat)));
-    let (warnings, notes) = messages(&caveats, Vec::new());
+    let (warnings, notes) = messages(&caveats);
 
     // Peaks beside their limits. A path file may give jerk limits of its own.
     let limits = crate::motions::motion::limits(&model);
@@ -321,7 +319,7 @@ impl From<&LimitViolation> for MotionViolation {
             LimitKind::Jerk => "jerk",
             LimitKind::Effort => "effort",
         };
-        Self { joint, kind, time_s, since_s, value, limit, message: violation.to_string() }
+        Self { joint, kind, time_s, since_s, value, limit, message: violation.warning().message }
     }
 }
 

@@ -28,7 +28,7 @@ impl RunLoop<'_> {
             }
         }
         for v in &self.motion.violations {
-            add(v.since_s, EventKind::Limit, v.to_string());
+            add(v.since_s, EventKind::Limit, v.warning().message);
         }
         for (c, load) in self.arm.model.coordinates().iter().zip(self.monitors.drive_loads.result()) {
             if let Some(since) = load.over_since_s {

@@ -62,7 +62,7 @@ impl Arm {
 /// Checks that a motion respects the joint limits, and that the options are valid for it.
 pub fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     if !motion.violations.is_empty() && !options.ignore_limits {
-        let mut violations: Vec<String> = motion.violations.iter().map(ToString::to_string).collect();
+        let mut violations: Vec<String> = motion.violations.iter().map(|v| v.warning().message).collect();
         if let Some(first) = violations.first_mut().filter(|_| !motion.likely.is_empty()) {
             *first += &format!(" ({})", motion.likely);
         }

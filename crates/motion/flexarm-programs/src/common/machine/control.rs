@@ -1,4 +1,8 @@
 //! Control flow: branches, loops, case distinctions, and branches that only the controller decides.
+//!
+//! A branch or loop whose condition only the controller knows is an error, unless its statements
+//! cannot move the robot. Loops that change no variable and cannot end are recognised instead of
+//! run.
 
 use std::rc::Rc;
 

@@ -1,4 +1,8 @@
 //! Values of expressions, and the literals that they come from.
+//!
+//! Start at [`Machine::value`]. A value that only the controller knows makes every value that is
+//! computed from it unknown, with its cause. Not here: operators (`operators`), functions of a
+//! language (its [`Dialect`]).
 
 use std::rc::Rc;
 
@@ -11,6 +15,7 @@ use crate::common::{Result, Span, fail};
 impl<D: Dialect> Machine<'_, D> {
     /// Evaluates an expression.
     pub(crate) fn value(&mut self, expression: &Expr) -> Result<Value> {
+        // Names and parts of variables, operators and calls, aggregates.
         let span = expression.span;
         match &expression.kind {
             Kind::Literal(value) => Ok(value.clone()),

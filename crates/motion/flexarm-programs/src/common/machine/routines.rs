@@ -1,4 +1,8 @@
 //! Calls of the program's routines, and the arguments of routines, functions and instructions.
+//!
+//! A routine runs with variables of its own; parameters that return values are copied back at its
+//! end. [`Machine::argument`] and [`Machine::named`] read the arguments of instructions. Not here:
+//! instructions.
 
 use std::rc::Rc;
 
@@ -51,10 +55,33 @@ impl<D: Dialect> Machine<'_, D> {
 
     /// Runs a routine; its return value is in [`Flow::Return`].
     pub(crate) fn invoke(&mut self, routine: &Rc<Routine>, arguments: &[Argument], span: Span) -> Result<Flow> {
+        let (scope, returned) = self.parameters(routine, arguments, span)?;
+        self.locals.push(scope);
+        let flow = self.nested(span, |machine| machine.run(&routine.body));
+        let scope = self.locals.pop().unwrap_or_default();
+        let flow = flow?;
+        for (name, place) in returned {
+            if let (Some(variable), Kind::Name(_) | Kind::Index(..) | Kind::Field(..)) = (scope.get(&name), &place.kind)
+            {
+                self.assign(&place, variable.value.clone())?;
+            }
+        }
+        Ok(flow)
+    }
+
+    /// Returns the variables of a routine at its beginning, and the parameters that return values
+    /// with the arguments that take them.
+    fn parameters(
+        &mut self,
+        routine: &Routine,
+        arguments: &[Argument],
+        span: Span,
+    ) -> Result<(Variables, Vec<(Rc<str>, Expr)>)> {
         let mut scope = Variables::new();
         let mut returned: Vec<(Rc<str>, Expr)> = Vec::new();
         let mut position = 0;
         for argument in arguments {
+            // The parameter of this argument, by its name or its position.
             let parameter = match &argument.name {
                 Some(name) => routine.parameters.iter().find(|parameter| parameter.name == *name),
                 None => {
@@ -67,6 +94,7 @@ impl<D: Dialect> Machine<'_, D> {
             let Some(parameter) = parameter else {
                 return fail(argument.span, format!("`{}` has no such parameter", routine.name));
             };
+            // Its value, and the literal that it comes from.
             let value = match &argument.value {
                 Some(expression) if parameter.returned => self.value(expression).unwrap_or(Value::Nothing),
                 Some(expression) => self.value(expression)?,
@@ -80,6 +108,7 @@ impl<D: Dialect> Machine<'_, D> {
                 returned.push((parameter.name.clone(), place.clone()));
             }
         }
+        // Parameters without an argument have their default values.
         for parameter in &routine.parameters {
             if scope.contains_key(&parameter.name) || parameter.optional && parameter.default.is_none() {
                 continue;
@@ -90,17 +119,7 @@ impl<D: Dialect> Machine<'_, D> {
             let value = self.value(default)?;
             scope.insert(parameter.name.clone(), Variable { origin: None, value, kind: parameter.kind.clone() });
         }
-        self.locals.push(scope);
-        let flow = self.nested(span, |machine| machine.run(&routine.body));
-        let scope = self.locals.pop().unwrap_or_default();
-        let flow = flow?;
-        for (name, place) in returned {
-            if let (Some(variable), Kind::Name(_) | Kind::Index(..) | Kind::Field(..)) = (scope.get(&name), &place.kind)
-            {
-                self.assign(&place, variable.value.clone())?;
-            }
-        }
-        Ok(flow)
+        Ok((scope, returned))
     }
 
     /// Whether an argument of the current routine was given (RAPID's `Present`).

@@ -1,4 +1,8 @@
 //! Variables: declaration, assignment to a variable or a part of one, and the count of changes.
+//!
+//! A variable remembers the literal that gave its value as long as nothing changes it, which is
+//! what `rewrite` replaces. Changes are counted, so that a loop which changes nothing is recognised
+//! as endless (`control`). Not here: values of expressions (`evaluate`).
 
 use std::rc::Rc;
 
@@ -233,6 +237,7 @@ fn part_of<'v>(value: &'v mut Value, part: &Part, first: i64, span: Span) -> Res
     if let Value::Outside(what) = value {
         return fail(span, depends(what));
     }
+    // A part that does not exist is created, also where the variable has no value yet.
     match part {
         Part::Field(field) => {
             if matches!(value, Value::Nothing) {

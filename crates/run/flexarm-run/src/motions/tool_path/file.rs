@@ -341,7 +341,7 @@ impl Reader<'_> {
         let p = Vector3::from(*point.get_ref()) * self.units.length;
         let near = entry.near.as_ref();
         let configuration =
-            near.map_or(Configuration::Nearest, |values| Configuration::Near(self.joint_values(values)));
+            near.map_or(Configuration::NEAREST, |values| Configuration::Near(self.joint_values(values)));
         let X_BT = Pose::from_parts(Translation3::from(p), turned);
         let statement = format!("{word} = {:?}", point.get_ref());
         Ok(self.of(table, &statement, kind, Target::Pose { X_BT, configuration }))
@@ -374,7 +374,7 @@ impl Reader<'_> {
             *R = Some(turned);
             let p = Vector3::new(point[0], point[1], point[2]) * self.units.length;
             let X_BT = Pose::from_parts(Translation3::from(p), turned);
-            let to = Target::Pose { X_BT, configuration: Configuration::Nearest };
+            let to = Target::Pose { X_BT, configuration: Configuration::NEAREST };
             let mut of = self.of(table, &format!("spline through {point:?}"), MoveKind::Spline, to);
             if k + 1 < n {
                 of.blend = Blend::Pass;
@@ -487,7 +487,7 @@ impl Reader<'_> {
             };
             let configuration = match (&entry.near, &kind) {
                 (Some(values), MoveKind::Joint) => Configuration::Near(self.joint_values(values)),
-                _ => Configuration::Nearest,
+                _ => Configuration::NEAREST,
             };
             // The halves of a circle are joined without a stop.
             let passes = matches!(kind, MoveKind::Arc { .. }) && k + 1 < count;

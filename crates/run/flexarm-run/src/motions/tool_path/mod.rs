@@ -175,7 +175,7 @@ impl<'a> Cell<'a> {
         let inconsistent = self.model.coordinates().iter().zip(&bounds).find_map(|(c, of): (_, &JointBounds)| {
             let jerk = of.jerk.unwrap_or(f64::INFINITY);
             let limits = MotionLimits { velocity: of.velocity, acceleration: of.acceleration, jerk };
-            Some(limits.odd(&c.joint, c.limits.velocity)?.to_string())
+            Some(limits.unusual(&c.joint, c.limits.velocity)?.message)
         });
         let accelerations = assumed.then(|| {
             format!(

@@ -1,4 +1,7 @@
 //! Bags of one or several files: those listed in `metadata.yaml` of a folder, or all in the folder.
+//!
+//! Files may be compressed as a whole (`.zstd`); what they hold is recognised by their first bytes.
+//! Not here: the contents of the files (`mcap`, `sqlite`).
 
 use std::fs::File;
 use std::io::{Read, Seek};
@@ -17,12 +20,15 @@ use crate::{MessageMotion, Request, mcap, sqlite, yaml};
 /// Maximum size of `metadata.yaml` (bytes).
 const MAX_METADATA: u64 = 16 << 20;
 
-/// Reads a rosbag2 folder.
+/// Reads a bag of ROS 2: a folder with `metadata.yaml`, or one file, MCAP or SQLite, which may be
+/// compressed as a whole by zstd.
 ///
 /// # Errors
-/// As [`crate::read_mcap`], and a folder that is not a bag.
-pub fn read_folder(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    let files = files_of(path)?;
+/// [`MotionError::Read`], or [`MotionError::Content`] if the folder is not a bag, a file is none of
+/// these, the requested topic does not exist, a message cannot be read, or the bag has no motion of
+/// the requested joints. SQLite files are refused without the feature `sqlite`.
+pub fn read_bag(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+    let files = if path.is_dir() { files_of(path)? } else { vec![path.to_owned()] };
     read_files(&files, path, request)
 }
 
@@ -97,36 +103,10 @@ fn stem(file: &Path) -> String {
 /// First bytes of a SQLite file.
 pub const SQLITE_MAGIC: &[u8] = b"SQLite format 3\0";
 
-/// Reads a SQLite file of rosbag2.
-///
-/// # Errors
-/// As [`crate::read_mcap`]; refused without the feature `sqlite`.
-pub fn read_db3(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    read_files(&[path.to_owned()], path, request)
-}
-
-/// Reads an MCAP file.
-///
-/// # Errors
-/// [`MotionError::Read`], or [`MotionError::Content`] if the file is not MCAP, the requested topic
-/// does not exist, a message cannot be read, or the bag has no motion of the requested joints.
-pub fn read_mcap(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    read_files(&[path.to_owned()], path, request)
-}
-
-/// Reads a bag that is compressed as a whole (`.mcap.zstd`, `.db3.zstd`).
-///
-/// # Errors
-/// [`MotionError`] as [`crate::read_mcap`] and [`crate::read_db3`], and if the content is not a
-/// bag.
-pub fn read_packed(path: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
-    read_files(&[path.to_owned()], path, request)
-}
-
 /// Reads the files of a bag as one.
 ///
 /// * `bag`: name of the bag for messages.
-pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
+fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     let shown = bag.display().to_string();
     let mut collector = Collector::new(*request);
     let (mut broken, mut format) = (Vec::new(), "MCAP bag");
@@ -137,6 +117,7 @@ pub(crate) fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -
         let mut open = File::open(file).map_err(failed)?;
         open.by_ref().take(16).read_to_end(&mut head).map_err(failed)?;
         let most = most_unpacked(open.metadata().map_err(failed)?.len());
+        // The format is that of the first bytes, whatever the name of the file is.
         let placed = |trouble: PlacedProblem| trouble.of(&origin);
         let ended = if head.starts_with(mcap::MCAP_MAGIC) {
             open.rewind().map_err(failed)?;
