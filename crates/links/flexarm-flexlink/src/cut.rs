@@ -155,7 +155,7 @@ pub fn share_inertia(link: &LinkInertia, halves: [&RigidPart; 2]) -> Result<Shar
     let obeys = least(&second(&link.inertia_com)) > 0.0;
     let is_body = |s: f64| least(&if obeys { second(&rest(s)) } else { rest(s) }) >= 0.0;
 
-    // Largest share by bisection, to the last bit.
+    // Maximum share by bisection, to the last bit.
     let (mut share, mut high) = (0.0, SHARES[1]);
     for _ in 0..60 {
         let middle = 0.5 * (share + high);

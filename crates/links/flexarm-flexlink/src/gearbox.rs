@@ -115,12 +115,12 @@ pub struct GearSpring {
 pub struct GearboxError {
     /// Name of the joint.
     pub joint: String,
-    /// What is wrong.
+    /// Cause.
     #[source]
     pub fault: GearboxFault,
 }
 
-/// What is wrong with a gearbox.
+/// Reason why a gearbox does not fit its joint, or is no spring.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GearboxFault {

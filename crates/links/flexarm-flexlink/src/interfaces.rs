@@ -1,4 +1,4 @@
-//! Assignment of child joints to the interfaces of a link.
+//! Assignment of child joints to the interfaces of a link, by the nearest position (link axes, m).
 
 use flexarm_kinematics::{Mechanism, Pose};
 use nalgebra::Vector3;
@@ -14,7 +14,7 @@ pub struct BranchJoint {
     pub interface: String,
 }
 
-/// Child joints of the link whose nearest interface is neither of its two ends.
+/// Returns the child joints of the link whose nearest interface is neither of its two ends.
 ///
 /// Rigid parts with springs represent the two ends only: a joint elsewhere would be rigidly
 /// attached to one of the parts, with errors up to a factor of two. Empty for links without data on

@@ -22,7 +22,9 @@ use crate::substitute::{
 /// length.
 const AT_INTERFACE: f64 = 1e-6;
 
-/// Converts the mass integrals and shapes to those of the tree model.
+/// Converts the mass integrals and shapes of a modal link to those of the tree model: the same numbers,
+/// about the origin of the link and in its axes (kg, kg m, kg m²; per modal coordinate). Second-order
+/// terms that are all zero, as those of condensed matrices, are left out.
 pub fn modal_body(link: &ModalLink) -> ModalBody {
     ModalBody {
         mass: link.mass,
@@ -31,7 +33,6 @@ pub fn modal_body(link: &ModalLink) -> ModalBody {
         C_t: link.C_t.column_iter().map(|c| c.into_owned()).collect(),
         C_r: link.C_r.column_iter().map(|c| c.into_owned()).collect(),
         P: link.P.clone(),
-        // Second-order terms that are not available are omitted.
         N: if link.N.iter().all(|N| N.amax() == 0.0) { Vec::new() } else { link.N.clone() },
         M: link.M.clone(),
         interfaces: link.interfaces.iter().map(|i| InterfaceShape { X_LI: i.X_LI, Phi: i.Phi.clone() }).collect(),

@@ -77,6 +77,11 @@ pub fn base_link<'m>(mechanism: &'m Mechanism, mounting: &str) -> Result<&'m Lin
 /// Inserts the springs between a new ground link and the base. Returns them, from the ground
 /// upward, and the location of their ends.
 ///
+/// ```text
+/// X_GB = X_GS X_ST X_TB,    X_GS = X_BS and X_TB = X_BS⁻¹, so that X_GB = 1 without deflection
+/// ```
+/// G is the ground, T the top of the springs, B the base.
+///
 /// # Errors
 /// [`MountingError`]; the mechanism is then unchanged.
 pub fn insert_mounting(
@@ -88,6 +93,7 @@ pub fn insert_mounting(
     if let Some(taken) = [name, &top].into_iter().find(|name| mechanism.link(name).is_some()) {
         return Err(MountingError::NameTaken(taken.clone()));
     }
+    // Ground and top of the springs, then the springs between them, then the base on the top.
     let base = base_link(mechanism, name)?.name.clone();
     spring_stiffness(K_S).map_err(|source| MountingError::Stiffness { mounting: name.clone(), source })?;
     mechanism.links.push(Link { name: name.clone(), inertia: None });

@@ -55,11 +55,11 @@ pub enum StiffnessError {
     NotDefinite {
         /// Minimum eigenvalue of the matrix scaled to a unit diagonal.
         min_eigenvalue: f64,
-        /// Row of the largest coupling.
+        /// Row of the entry with the maximum coupling.
         row: usize,
-        /// Column of the largest coupling.
+        /// Column of that entry.
         column: usize,
-        /// Largest coupling, as written.
+        /// Entry with the maximum coupling, as written.
         coupling: f64,
         /// Its magnitude relative to the geometric mean of its diagonal entries.
         relative: f64,

@@ -59,7 +59,7 @@ pub enum LinkForm {
 }
 
 impl LinkForm {
-    /// Name for messages and reports.
+    /// Returns the name for messages and reports.
     pub fn name(&self) -> &'static str {
         match self {
             Self::TwoParts | Self::Chain(_) => "lumped",
@@ -217,7 +217,7 @@ pub enum SubstitutionError {
     NotModal {
         /// The link.
         link: String,
-        /// What was found and expected.
+        /// Value found, and the one expected.
         what: String,
     },
 }

@@ -199,13 +199,15 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
                 Finding { help: help.into(), likely: likely(), ..error }
             };
             findings.extend(motion.violations.iter().map(passed));
-            let closed = robot.rigid_model().map(|model| loops::along_motion(&model, &motion.trajectory).err());
-            findings.extend(closed.ok().flatten().map(|e| error("loop", file(), &e)));
-            let balancers = robot.rigid_model().map(|model| balancer::check_motion(&model, &motion.trajectory));
-            findings.extend(balancers.ok().and_then(Result::err).map(|e| error("balancer", file(), &e)));
-            let along = robot.rigid_model().map(|model| of_motion(&motion.name, &motion.trajectory, &model));
-            let caveats = motion.caveats().into_iter().chain(along.unwrap_or_default());
-            findings.extend(caveats.map(|caveat| about(path, caveat)));
+            let mut caveats = motion.caveats();
+            if let Ok(model) = robot.rigid_model() {
+                let closed = loops::along_motion(&model, &motion.trajectory);
+                findings.extend(closed.err().map(|e| error("loop", file(), &e)));
+                let balancers = balancer::check_motion(&model, &motion.trajectory);
+                findings.extend(balancers.err().map(|e| error("balancer", file(), &e)));
+                caveats.extend(of_motion(&motion.name, &motion.trajectory, &model));
+            }
+            findings.extend(caveats.into_iter().map(|caveat| about(path, caveat)));
             Some(motion)
         }
     }

@@ -51,6 +51,8 @@ use summary::Parts;
 pub use flexarm_fe_io::exchange::MatrixNames as Names;
 pub use flexarm_fem::matrix_link::PartMasses;
 pub use flexarm_fem::{RigidPart, UnitSystem as UnitsOfFile};
+
+pub use crate::reduce::ReduceOutputs as ImportOutputs;
 pub use summary::{ImportChecks, ImportFiles, ImportInterface, ImportSummary, markdown, tables};
 pub use words::{FrameAt, ImportFormat, ImportMap, NodePlane, parse_inertia, parse_part, triple};
 
@@ -121,17 +123,6 @@ impl ImportJob {
         };
         self.name.clone().unwrap_or_else(from_file)
     }
-}
-
-/// Paths of the results.
-#[derive(Clone, Debug, Default)]
-pub struct ImportOutputs {
-    /// Folder for link file, summary and report; created if missing.
-    pub folder: Option<PathBuf>,
-    /// Separate path of the link file.
-    pub flex: Option<PathBuf>,
-    /// Whether to overwrite existing files.
-    pub overwrite: bool,
 }
 
 /// Reads matrices, makes a link of them and writes the files.

@@ -12,10 +12,10 @@ use super::job::ReduceJob;
 /// Extension of the stress file beside a link file.
 pub const STRESS_FILE: &str = "stress";
 
-/// Paths of the results.
+/// Paths of the results of a reduction or an import.
 #[derive(Clone, Debug, Default)]
 pub struct ReduceOutputs {
-    /// Folder for link file, job, summary and report; created if missing.
+    /// Folder for link file, summary and report, and the job of a reduction; created if missing.
     pub folder: Option<PathBuf>,
     /// Separate path of the link file.
     pub flex: Option<PathBuf>,

@@ -222,7 +222,7 @@ impl Arm {
     }
 
     /// Returns the caveats about the models of the links.
-    pub fn link_caveats(&self) -> Vec<Finding> {
+    pub(crate) fn link_caveats(&self) -> Vec<Finding> {
         let help = "write model = \"modal\" into the robot file";
         let instead = self.modal_instead.iter().map(|text| Finding::warning("third-interface", "links", text, help));
         self.findings.iter().cloned().chain(instead).collect()

@@ -70,7 +70,7 @@ impl Robot {
         let mounting = mounted.as_ref().map(|_| substituted.spans.len() - 1);
         owned.extend(mounted.into_iter().flatten());
         let (springs, owners) = in_coordinate_order(&model, owned)?;
-        // What acts on the joints besides springs.
+        // Friction, torques and gear laws of the joints.
         let (friction, torque) = self.actuation(&model, modelling.drives);
         let gears = self.gear_laws(&model, &owners);
         Ok(Arm {

@@ -1,7 +1,8 @@
 //! Default gains of servos: values that suit the inertia at the start.
 //!
 //! A position loop gives the velocity error `e = q̇_d - q̇ + k_p (q_d - q)`, the velocity loop inside it
-//! the torque `k_v e + k_i ∫ e dt`, both sampled. Gains that the robot file gives stay. Not here: the sampled loop (`flexarm_stepping::Servo`).
+//! the torque `k_v e + k_i ∫ e dt`, both sampled. Gains that the robot file gives stay.
+//! Not here: the sampled loop (`flexarm_stepping::Servo`).
 
 use flexarm_kinematics::{Data, mass_matrix};
 use flexarm_stepping::ServoAxis;

@@ -127,6 +127,8 @@ pub(crate) fn of_loads(loads: &[Load], duration: f64, size: &Size) -> Vec<Findin
 }
 
 /// Checks a constant wrench on the TCP against weight and size of the arm with its payload.
+///
+/// * `wrench`: force, then moment (N, N m), in any axes.
 pub fn of_wrench(wrench: &[f64; 6], size: &Size) -> Vec<Finding> {
     let norm = |x: &[f64]| x.iter().map(|x| x * x).sum::<f64>().sqrt();
     heavy(norm(&wrench[..3]), norm(&wrench[3..]), size)

@@ -22,7 +22,8 @@ pub struct Size {
 }
 
 impl Size {
-    /// Returns the size of a mechanism at its zero pose.
+    /// Returns the size of a mechanism: distances between joint origins along the chain, whatever the
+    /// pose, and the whole travel of sliding joints with limits.
     pub fn of(mechanism: &Mechanism) -> Self {
         let mut distances = HashMap::new();
         let children: Vec<&str> = mechanism.joints.iter().map(|j| j.child.as_str()).collect();

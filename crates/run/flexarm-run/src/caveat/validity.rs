@@ -95,6 +95,8 @@ fn like_degrees(c: &Coordinate, q: f64) -> bool {
 }
 
 /// Checks for joints outside their range at a pose, and for joints without a range at many turns.
+///
+/// * `q`: values of the coordinates, in their order (rad or m).
 pub fn outside_limits<'a>(coordinates: &'a [Coordinate], q: &'a [f64]) -> impl Iterator<Item = Finding> + 'a {
     coordinates.iter().zip(q).filter_map(|(c, q)| {
         let (lower, upper) = (c.limits.lower, c.limits.upper);

@@ -88,6 +88,7 @@ impl Robot {
         if self.rigid.balancers.iter().any(|other| other.name == name) {
             return Err(fail(" is defined twice: names must be unique".into()));
         }
+        // Over one joint that moves by itself, or along the line between two frames.
         let span = match ends {
             BalancerEnds::Joint(joint) => {
                 let moves = |j: &&Joint| j.kind.axis_motion().is_some() && !j.kind.is_elastic();

@@ -1,4 +1,7 @@
 //! Checks and conversions shared by the entries of a robot file.
+//!
+//! Positions are in link axes (m), rotations roll, pitch, yaw (rad). Not here: ranges of numbers
+//! ([`crate::ranges`]), a 6×6 stiffness (`flexarm_flexlink::spring_stiffness`).
 
 use std::ops::Range;
 

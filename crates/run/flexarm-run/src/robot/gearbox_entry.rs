@@ -84,7 +84,8 @@ pub struct GearDamping {
 }
 
 impl GearDamping {
-    /// Returns the damping of the gearbox spring number `component`, which has `size` coordinates.
+    /// Returns the damping of the gearbox spring number `component`, which has `size` coordinates: 1, or
+    /// 6 for springs that are coupled. 3 % modal damping without dampers, and for the springs of a seat.
     pub fn of(&self, component: usize, size: usize) -> Damping {
         match &self.dampers {
             None => Damping::Modal(0.03),
@@ -255,7 +256,7 @@ fn dampers(gear: &GearboxEntry, size: usize, at: GearboxFault<'_>) -> Result<Opt
     }
 }
 
-/// Reads the gearbox of a telescopic joint: the guide alone.
+/// Reads the gearbox of a telescopic joint, which has a guide and no other spring.
 fn guide_gear(
     joint: &Joint,
     guide: &GuideEntry,

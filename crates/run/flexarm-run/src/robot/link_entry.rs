@@ -135,7 +135,7 @@ pub(crate) fn flexible_link(
     let (form, coupling) = (LinkForm::TwoParts, entry.coupling);
     let flexible = FlexibleLink { link: name.clone(), distal, reduced, parts, form, angles, coupling };
 
-    // What applies to all forms of the link: factors, stress, strength.
+    // Factors, stress and strength apply to all forms of the link.
     let geometric = entry.geometric_stiffening.as_ref().is_some_and(|asked| *asked.get_ref());
     let choices = LinkChoices { model, segments, modes, eigenmodes, geometric };
     let (stiffness_factor, stiffness_factors) = factors(entry, source)?;

@@ -1,4 +1,6 @@
-//! Closed loop entries of a robot file: from the text to a checked tree. Points are in link axes (m).
+//! Closed loop entries of a robot file: from the text to a checked tree.
+//!
+//! Points are in link axes (m). Not here: the loops of a robot ([`crate::robot::loops`]).
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -156,7 +156,7 @@ impl Robot {
 
     /// Returns the caveats that are known before any computation.
     pub fn caveats(&self) -> Vec<Finding> {
-        // What loading found, in the file's own order: entries, URDF, text.
+        // Findings of loading: entries, URDF, text of the file.
         let file = self.path.display().to_string();
         let of_urdf = |text: &&String| self.urdf.warnings_only().any(|w| **text == finding_text(w));
         let own = self.warnings.iter().filter(|text| !of_urdf(text));
@@ -164,7 +164,7 @@ impl Robot {
         let urdf =
             self.urdf.warnings_only().map(|w| Finding { message: finding_text(w), of_description: true, ..w.clone() });
         let mut caveats: Vec<Finding> = own.chain(urdf).chain(self.written.iter().cloned()).collect();
-        // What the numbers themselves show: parts, links, mounting, drives, balancers, loops.
+        // Findings about the numbers: parts, links, mounting, drives, balancers, loops.
         caveats.extend(caveat::parts::of_robot(self));
         let inertia = |link: &RobotLink| self.urdf.mechanism.link(&link.flexible.link).and_then(|own| own.inertia);
         caveats

@@ -105,7 +105,7 @@ impl RobotLink {
     }
 
     /// Whether the source provides geometric stiffening for a modal link.
-    pub fn has_geometric(&self) -> bool {
+    pub(crate) fn has_geometric(&self) -> bool {
         let stored = self.flexible.reduced.details.as_ref().and_then(|details| details.modal.as_ref());
         self.beam.is_some() || stored.is_some_and(|modal| modal.geometric.is_some())
     }
@@ -120,7 +120,7 @@ impl RobotLink {
 
     /// As [`Self::form`], with the robot file key that requested what is missing.
     pub(crate) fn form_or_key(&self, modelling: &Modelling) -> Result<LinkForm, (RequestedKey, String)> {
-        // What only one of the models has is an error with the other.
+        // A key that only one of the models has is an error with the other.
         let link = &self.flexible.link;
         let model = if modelling.links == LinkModel::AsFiled { self.choices.model } else { modelling.links };
         match model {

@@ -12,6 +12,7 @@ use flexarm_kinematics::Pose;
 use flexarm_settings::written::markup;
 use nalgebra::UnitQuaternion;
 
+use super::numbers;
 use super::parts::{Axis, MESHES, Part};
 use super::springs::{JointSpring, Springs};
 use crate::poses::posed::Posed;
@@ -195,10 +196,6 @@ fn rest(posed: &Posed, axes: &[&Axis], motors: &[&Axis]) -> String {
         numbers(&qpos),
         numbers(&ctrl)
     )
-}
-
-fn numbers(values: &[f64]) -> String {
-    values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(" ")
 }
 
 /// Attributes of a pose; none for the identity.

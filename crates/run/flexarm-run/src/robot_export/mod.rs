@@ -97,6 +97,11 @@ impl RobotExport {
     }
 }
 
+/// Numbers as XML attributes have them; each reads back as the same number.
+fn numbers(values: &[f64]) -> String {
+    values.iter().map(|value| format!("{value:?}")).collect::<Vec<_>>().join(" ")
+}
+
 /// Name that every file system takes.
 fn file_name(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect()

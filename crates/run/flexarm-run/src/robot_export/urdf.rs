@@ -7,8 +7,8 @@ use std::fmt::Write as _;
 
 use flexarm_kinematics::{Limits, Pose};
 use flexarm_settings::written::markup;
-use nalgebra::Vector3;
 
+use super::numbers;
 use super::parts::{Axis, MESHES, Part};
 use crate::poses::posed::Posed;
 use crate::robot::Robot;
@@ -36,7 +36,7 @@ pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part]) -> String {
             let _ = write!(out, "  <joint name=\"{}\" type=\"{kind}\">", markup(&axis.name));
             let _ = write!(out, "<parent link=\"{}\"/><child link=\"{}\"/>", markup(&parent), markup(&child));
             out += &origin(&if k == 0 { part.X_PB } else { Pose::identity() });
-            let _ = write!(out, "<axis xyz=\"{}\"/>{}", numbers(&axis.axis), limit(axis, posed));
+            let _ = write!(out, "<axis xyz=\"{}\"/>{}", numbers(axis.axis.as_slice()), limit(axis, posed));
             if let (Some((ratio, offset)), Some(leader)) = (axis.follows, driver(axis)) {
                 let leader = markup(&leader.name);
                 let _ = write!(out, "<mimic joint=\"{leader}\" multiplier=\"{ratio:?}\" offset=\"{offset:?}\"/>");
@@ -63,7 +63,7 @@ fn link(out: &mut String, part: &Part) {
             out,
             "    <inertial><origin xyz=\"{}\"/><mass value=\"{:?}\"/><inertia ixx=\"{:?}\" ixy=\"{:?}\" ixz=\"{:?}\" iyy=\"{:?}\" \
              iyz=\"{:?}\" izz=\"{:?}\"/></inertial>",
-            numbers(&part.com),
+            numbers(part.com.as_slice()),
             part.mass,
             I[(0, 0)],
             I[(0, 1)],
@@ -109,9 +109,5 @@ fn limit(axis: &Axis, posed: &Posed) -> String {
 
 fn origin(X: &Pose) -> String {
     let (roll, pitch, yaw) = X.rotation.euler_angles();
-    format!("<origin xyz=\"{}\" rpy=\"{}\"/>", numbers(&X.translation.vector), numbers(&Vector3::new(roll, pitch, yaw)))
-}
-
-fn numbers(v: &Vector3<f64>) -> String {
-    format!("{:?} {:?} {:?}", v.x, v.y, v.z)
+    format!("<origin xyz=\"{}\" rpy=\"{}\"/>", numbers(X.translation.vector.as_slice()), numbers(&[roll, pitch, yaw]))
 }

@@ -116,13 +116,14 @@ impl Readings {
         &self.observed.qddot.as_slice()[self.arm.model.n_actuated()..]
     }
 
-    /// Returns the TCP pose in the world.
+    /// Returns the TCP pose `X_WT` in the world (m), with the deflections.
     pub fn tcp_pose(&self) -> Pose {
         let tcp = &self.arm.tcp;
         self.observed.X_WB[tcp.body] * tcp.X_BF
     }
 
-    /// Returns the velocity of the TCP: linear, then angular, world axes (m/s, rad/s).
+    /// Returns the velocity `V_WT` of the TCP at its origin: linear, then angular, world axes (m/s,
+    /// rad/s).
     pub fn tcp_velocity(&mut self) -> Vector6<f64> {
         let (data, state) = &mut self.moving;
         state.q.copy_from(&self.observed.q);
@@ -164,7 +165,7 @@ impl Readings {
         values
     }
 
-    /// Returns the TCP pose of the rigid arm with its joints at the last targets.
+    /// Returns the TCP pose `X_WT` of the rigid arm with its joints at the last targets.
     pub fn target_pose(&mut self) -> Pose {
         let (data, state) = &mut self.rigid;
         forward_kinematics(&self.arm.rigid, data, &state.q);
