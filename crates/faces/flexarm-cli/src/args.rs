@@ -1,4 +1,9 @@
 //! Command-line arguments, defaults and help texts.
+//!
+//! Start at [`RunArgs`]: what `run` and `compare` take. [`RobotArgs`] and [`ModellingArgs`] are
+//! shared by the commands that load a robot. Units are those that a user types; conversions stand
+//! beside the parsers. Not here: arguments of one command (beside it, or in its `*_args.rs`), what
+//! is done with them.
 
 use std::path::{Path, PathBuf};
 

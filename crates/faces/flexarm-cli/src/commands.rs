@@ -1,4 +1,8 @@
 //! Commands of the program and its help.
+//!
+//! Start at [`Command`]: each variant has the arguments of a command, [`run`] calls its function.
+//! Not here: arguments and tables of a command (a file of its name), errors and exit codes
+//! (`failure.rs`, `lib.rs`).
 
 use std::ffi::OsString;
 use std::process::ExitCode;

@@ -1,4 +1,7 @@
 //! `flexarm compensate`: finds a motion with which the flexible arm's TCP follows the rigid one's.
+//!
+//! [`run`] turns flags into a request, [`text`] prints errors before and after (mm). Not here: the
+//! inverse model and input shapers (`flexarm::compensate`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;

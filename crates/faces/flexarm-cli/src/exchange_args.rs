@@ -1,4 +1,6 @@
 //! Arguments of `flexarm import` and `flexarm export`.
+//!
+//! Not here: the jobs that are made of them (`exchange.rs`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,6 @@
 //! `flexarm export-fmu`: from flags to an FMU.
+//!
+//! The library in an FMU is the one beside the program. Not here: the file (`flexarm-fmu`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;

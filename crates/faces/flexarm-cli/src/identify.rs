@@ -1,4 +1,7 @@
 //! `flexarm identify`: parameters from measurements, and plans of poses to measure.
+//!
+//! [`run`] turns flags into a request and prints the answer; lengths in mm, rotations in mrad. Not
+//! here: least squares and the file of measurements (`flexarm::identify`).
 
 use std::cell::{Cell, RefCell};
 use std::io::IsTerminal;

@@ -1,4 +1,7 @@
 //! Text that fits the terminal: tables and paragraphs, in which no number and no word is cut.
+//!
+//! Start at [`table`]: a table that is too wide is printed in blocks of columns, each with the
+//! first column. Widths are counted in columns of the terminal without ANSI codes.
 
 use flexarm::settings::written::one_line;
 

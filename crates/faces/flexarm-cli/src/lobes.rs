@@ -1,4 +1,6 @@
 //! `flexarm lobes`: from flags to a request, and a table for people.
+//!
+//! Speeds in rpm, depths in mm. Not here: the stability of milling (`flexarm::lobes`).
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

@@ -1,4 +1,7 @@
 //! `flexarm map`: from flags to a request, and a table for people.
+//!
+//! [`region`] parses a box or ranges of joints (m, or rad and m of the joints, with units as
+//! typed); [`text`] prints quantiles and extremes. Not here: poses and quantities (`flexarm::map`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,4 +1,7 @@
 //! `flexarm motion`: contents of a motion, compared with the limits of a robot.
+//!
+//! [`text`] prints peaks against limits in units of the joints (deg or mm, per s). Not here: how
+//! peaks are found (`flexarm::motions`).
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -1,4 +1,7 @@
 //! `flexarm new`: a robot file, a sample motion and a first run from a robot description.
+//!
+//! [`run`] writes the folder, then makes a first run with it. Not here: estimates and classes of
+//! reducers (`flexarm::new`).
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

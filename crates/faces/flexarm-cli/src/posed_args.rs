@@ -1,4 +1,6 @@
 //! Arguments of `flexarm statics`, `flexarm modes` and `flexarm response`.
+//!
+//! Not here: requests and tables (`posed.rs`), values of joints and wrenches (`values.rs`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,7 @@
-//! Tables for people.
+//! Tables and lines for people about robots, links and meshes; findings and warnings.
+//!
+//! Numbers are printed in the units of their heads (mm, deg, Hz). Not here: widths and line breaks
+//! (`layout.rs`), figures of a run (`summary_table.rs`), tables of one command (beside it).
 
 use std::io::Write as _;
 

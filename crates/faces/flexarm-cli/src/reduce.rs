@@ -1,4 +1,7 @@
 //! `flexarm reduce`: from flags to a job, and progress on the terminal.
+//!
+//! A job comes from a file, from flags, or from both: flags fill what a file leaves open and must
+//! not say it twice. Not here: the reduction (`flexarm::links::reduce`).
 
 use std::process::ExitCode;
 

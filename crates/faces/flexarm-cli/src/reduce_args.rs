@@ -1,4 +1,7 @@
 //! Arguments of `flexarm reduce`.
+//!
+//! Words such as `NAME=SET` and `x,y,z` are parsed here to the types of a job, with the units of
+//! the mesh. Not here: the job that is made of them (`reduce.rs`).
 
 use std::path::PathBuf;
 use std::str::FromStr;

@@ -1,4 +1,7 @@
 //! `flexarm run` and `compare`: from flags to runs.
+//!
+//! Start at [`run`]: one run, or a study of several with `--with`. Not here: parsing of variants
+//! (`study.rs`), the table of figures (`summary_table.rs`).
 
 use std::ffi::OsString;
 use std::process::ExitCode;

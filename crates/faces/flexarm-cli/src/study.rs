@@ -1,4 +1,7 @@
 //! `--with`: additional runs, each with some options changed.
+//!
+//! `--with "key=value ..."` repeats the command line with some flags changed, so that a variant
+//! takes every flag that a run takes. Start at [`parts`]. Not here: the runs (`simulate.rs`).
 
 use std::borrow::Cow;
 use std::ffi::OsString;

@@ -1,4 +1,8 @@
 //! Output of a command: text or JSON, progress.
+//!
+//! Start at [`Terminal`]: whether people or programs read the output. Answers go to standard
+//! output, progress and warnings to standard error. Not here: texts and tables (`print.rs`,
+//! `layout.rs`).
 
 use std::io::{IsTerminal, Write};
 use std::process::ExitCode;

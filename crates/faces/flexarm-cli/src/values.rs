@@ -1,4 +1,7 @@
 //! Joint values and wrenches as typed by the user.
+//!
+//! Joints by position or by name, each with its unit (rad or deg, m or mm; without one rad and m);
+//! wrenches as six numbers, force (N) then torque (N m), world axes.
 
 use flexarm::Robot;
 use flexarm::links::reduce::numbers;

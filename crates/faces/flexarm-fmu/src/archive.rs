@@ -109,6 +109,7 @@ fn failed(path: &Path) -> impl FnOnce(std::io::Error) -> FmuError + '_ {
 /// [`FmuError::Robot`] if the robot cannot be loaded, [`FmuError::File`] if a file cannot be
 /// read or written, exists, or if the arm of the resources is not the original one.
 pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, FmuError> {
+    // All that can be refused is refused before the arm is compared with its resources.
     flexarm::files::check_free(std::slice::from_ref(&job.output), job.overwrite)?;
     let library = fs::read(&job.library).map_err(failed(&job.library))?;
     let model = FmuModel::new(&job.robot, &job.settings)?;
@@ -118,17 +119,20 @@ pub fn export_fmu(job: &FmuJob) -> Result<FmuSummary, FmuError> {
     flexarm::files::check_apart(std::slice::from_ref(&job.output), &read.collect::<Vec<_>>())?;
     let (files, meshes) = resources(&model, &job.settings)?;
 
+    // Description and resources are tied together by a token of the resources' bytes.
     let about_step = model.variables().iter().find(|variable| variable.name == "step").and_then(|step| step.start);
     let step_s = about_step.unwrap_or_default();
     let token = token(&files);
     let about = About { name: &model.arm().robot().name, token: &token, step_s };
     let xml = description(job.fmi, &about, model.variables()).map_err(failed(&job.output))?;
     let html = page(&about, model.variables()).map_err(failed(&job.output))?;
+    // The entries of the zip file.
     let platform = platform(job.fmi);
     let binary = format!("binaries/{platform}/{MODEL_IDENTIFIER}.{}", std::env::consts::DLL_EXTENSION);
     let mut entries = vec![("modelDescription.xml".to_owned(), xml), (binary, library)];
     entries.push(("documentation/index.html".to_owned(), html));
-    let filed = serde_json::to_vec_pretty(&filed(&model, &job.settings, &token, step_s)).unwrap_or_default();
+    let filed =
+        serde_json::to_vec_pretty(&filed(&model, &job.settings, &token, step_s)).expect("plain numbers and words");
     entries.push((format!("resources/{SETTINGS}"), filed));
     entries.extend(files.into_iter().map(|(name, bytes)| (format!("resources/{name}"), bytes)));
     let bytes = zipped(&entries).map_err(failed(&job.output))?;
@@ -353,6 +357,7 @@ pub fn open_resources(folder: &Path, token: &str) -> Result<FmuModel, FmuError> 
         let what = format!("the token {token:?} is not that of this FMU, {:?}", filed.token);
         return Err(damaged(format!("{what}: its description and its resources do not belong together")));
     }
+    // Words of the file to settings.
     let stepper = StepperEntry::named(&filed.stepper);
     let stepper = stepper.ok_or_else(|| damaged(format!("stepper = {:?}: there is no such stepper", filed.stepper)))?;
     let word = |what: &str, word: &str| damaged(format!("{what} = {word:?}: there is no such model"));

@@ -1,4 +1,7 @@
-//! `modelDescription.xml` of FMI 2.0 and 3.0.
+//! `modelDescription.xml` of FMI 2.0 and 3.0, and the page about the variables.
+//!
+//! Start at [`description`]. The position of a variable in the list is its reference; FMI 2.0 counts
+//! positions from one where it asks for an index. Not here: the zip file (`archive.rs`).
 
 use std::collections::BTreeSet;
 use std::io;
@@ -41,6 +44,7 @@ pub fn description(fmi: Fmi, about: &About<'_>, variables: &[Variable]) -> io::R
     let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
     xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
     let token = if fmi == Fmi::V2 { "guid" } else { "instantiationToken" };
+    // Attributes of the whole model.
     let root = xml.create_element("fmiModelDescription").with_attributes([
         ("fmiVersion", if fmi == Fmi::V2 { "2.0" } else { "3.0" }),
         ("modelName", about.name),
@@ -49,6 +53,7 @@ pub fn description(fmi: Fmi, about: &About<'_>, variables: &[Variable]) -> io::R
         ("generationTool", concat!("flexarm ", env!("CARGO_PKG_VERSION"))),
         ("variableNamingConvention", "structured"),
     ]);
+    // Its parts, in the order of the standard's schema.
     root.write_inner_content(|xml| {
         interfaces(xml, fmi, variables)?;
         xml.create_element("UnitDefinitions").write_inner_content(units)?;
@@ -220,6 +225,7 @@ pub(crate) fn page(about: &About<'_>, variables: &[Variable]) -> io::Result<Vec<
     let text = |xml: &mut Xml, element: &str, text: &str| {
         xml.create_element(element).write_text_content(BytesText::new(text)).map(drop)
     };
+    // Title, a paragraph on step and inputs, a row for each variable.
     xml.create_element("html").with_attribute(("lang", "en")).write_inner_content(|xml| {
         xml.create_element("head").write_inner_content(|xml| {
             xml.create_element("meta").with_attribute(("charset", "utf-8")).write_empty()?;

@@ -1,4 +1,5 @@
-//! Errors of plants and FMUs.
+//! Errors of plants and FMUs. An importer gets their texts by its logger, a caller in C by
+//! `flexarm_error`.
 
 use std::path::PathBuf;
 
@@ -24,6 +25,16 @@ pub enum FmuError {
         found: f64,
         /// Values expected.
         expected: &'static str,
+    },
+    /// A list has another number of values than the plant has places for.
+    #[error("{what}: {found} value(s) given, expected {expected}")]
+    Length {
+        /// What the list is.
+        what: &'static str,
+        /// Number of values given.
+        found: usize,
+        /// Number of values expected.
+        expected: usize,
     },
     /// The arm is no differential equation in its coordinates.
     #[error(
@@ -56,6 +67,11 @@ pub enum FmuError {
 }
 
 impl FmuError {
+    /// Checks the number of values of a list.
+    pub(crate) fn check_length(what: &'static str, found: usize, expected: usize) -> Result<(), Self> {
+        if found == expected { Ok(()) } else { Err(Self::Length { what, found, expected }) }
+    }
+
     /// Error about a number that is not finite.
     pub(crate) fn not_finite(name: &str, found: f64) -> Self {
         Self::Value { name: name.to_owned(), found, expected: "a finite number" }

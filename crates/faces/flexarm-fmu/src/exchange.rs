@@ -1,4 +1,10 @@
 //! Model exchange: the plant as a differential equation, at states that a solver outside sets.
+//!
+//! ```text
+//! x = (q, q̇),   ẋ = (q̇, q̈(x, u))        u: motion of prescribed joints, torques, wrench
+//! ```
+//! `q` are the coordinates of driven joints and the elastic ones. Outputs are computed when they are
+//! read and state or inputs have changed. Not here: co-simulation (`model.rs`).
 
 use flexarm::live::EquationCommand;
 
@@ -64,14 +70,15 @@ impl FmuModel {
         self.states.states.iter().map(|&reference| self.values[reference]).collect()
     }
 
-    /// Sets the continuous states.
+    /// Sets the continuous states, in the order of [`FmuModel::state_references`].
     ///
     /// # Errors
-    /// [`FmuError::Value`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
+    /// [`FmuError::Length`], [`FmuError::Value`]; [`FmuError::NotStarted`] before [`FmuModel::start_equations`].
     pub fn set_states(&mut self, states: &[f64]) -> Result<(), FmuError> {
         if !matches!(self.running, Some(Running::Equations { .. })) {
             return Err(FmuError::NotStarted);
         }
+        FmuError::check_length("continuous states", states.len(), self.states.states.len())?;
         for (&reference, &found) in self.states.states.iter().zip(states) {
             if !found.is_finite() {
                 return Err(FmuError::not_finite(&self.variables[reference].name, found));
@@ -84,7 +91,7 @@ impl FmuModel {
         Ok(())
     }
 
-    /// Returns the derivatives of the continuous states.
+    /// Computes the derivatives of the continuous states, in their order (unit of the state per s).
     ///
     /// # Errors
     /// As [`FmuModel::evaluate`].
@@ -120,12 +127,21 @@ impl FmuModel {
         Ok(())
     }
 
-    /// Returns the derivative of `unknowns` (outputs, derivatives of states) in a direction of
-    /// `knowns` (inputs, states), by central differences of fourth order.
+    /// Computes the derivative of `unknowns` (outputs, derivatives of states) in a direction of
+    /// `knowns` (inputs, states), by central differences of fourth order:
+    ///
+    /// ```text
+    /// y' = Σ_k s_k [y(u - 2h) - 8 y(u - h) + 8 y(u + h) - y(u + 2h)] / 12h
+    /// ```
+    ///
+    /// * `seed`: `s`, one number for each of the knowns.
+    ///
+    /// Returns one number for each of the unknowns. Costs four evaluations for each known whose
+    /// seed is not zero. State and inputs are those of before.
     ///
     /// # Errors
-    /// [`FmuError::Variable`], also for a known that
-    /// is neither input nor state; as [`FmuModel::evaluate`].
+    /// [`FmuError::Length`]; [`FmuError::Variable`], also for a known that is neither input nor
+    /// state; as [`FmuModel::evaluate`].
     pub fn directional_derivative(
         &mut self,
         unknowns: &[usize],
@@ -135,6 +151,7 @@ impl FmuModel {
         if !matches!(self.running, Some(Running::Equations { .. })) {
             return Err(FmuError::NotStarted);
         }
+        FmuError::check_length("seed", seed.len(), knowns.len())?;
         unknowns.iter().try_for_each(|&reference| self.get(reference).map(drop))?;
         for &reference in knowns {
             let known = self.variable(reference, Kind::Real)?;
@@ -142,6 +159,7 @@ impl FmuModel {
                 return Err(FmuError::not_settable(&known.name));
             }
         }
+        // The plant is evaluated beside its state, which is put back whatever happens.
         let values = self.values.clone();
         let mut slopes = vec![0.0; unknowns.len()];
         let mut differences = || {

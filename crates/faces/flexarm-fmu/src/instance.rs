@@ -1,4 +1,7 @@
 //! An instance of an FMU: a plant with the phases of the standard, one text for both versions.
+//!
+//! Each function of FMI checks its phase and calls [`FmuModel`]; a function out of order is refused
+//! and changes nothing. Not here: pointers and status codes (`ffi`), the arm (`model.rs`).
 
 use std::path::Path;
 
@@ -143,7 +146,6 @@ impl Instance {
 
     pub(crate) fn set_states(&mut self, states: &[f64]) -> Result<(), FmuError> {
         self.expect("setting states", &EXCHANGE)?;
-        self.check_count(states.len())?;
         self.model.set_states(states)
     }
 
@@ -151,7 +153,7 @@ impl Instance {
     pub(crate) fn write_states(&mut self, what: StateValues, to: &mut [f64]) -> Result<(), FmuError> {
         let phases = [Phase::Initialisation, Phase::Event, Phase::Continuous];
         self.expect("reading states", &phases)?;
-        self.check_count(to.len())?;
+        FmuError::check_length("continuous states", to.len(), self.n_states())?;
         self.current_outputs()?;
         let values = match what {
             StateValues::States => self.model.states(),
@@ -160,13 +162,6 @@ impl Instance {
         };
         to.copy_from_slice(&values);
         Ok(())
-    }
-
-    fn check_count(&self, count: usize) -> Result<(), FmuError> {
-        match count == self.n_states() {
-            true => Ok(()),
-            false => Err(FmuError::Order { function: "a function of states", phase: "with another number of states" }),
-        }
     }
 
     pub(crate) fn n_states(&self) -> usize {
@@ -180,9 +175,7 @@ impl Instance {
         to: &mut [f64],
     ) -> Result<(), FmuError> {
         self.expect("a directional derivative", &EXCHANGE)?;
-        if seed.len() != knowns.len() || to.len() != unknowns.len() {
-            return Err(FmuError::Order { function: "a directional derivative", phase: "with other lengths" });
-        }
+        FmuError::check_length("directional derivative", to.len(), unknowns.len())?;
         let [unknowns, knowns] = [unknowns, knowns].map(|own| own.iter().map(|k| *k as usize).collect::<Vec<_>>());
         to.copy_from_slice(&self.model.directional_derivative(&unknowns, &knowns, seed)?);
         Ok(())
@@ -245,7 +238,7 @@ impl Instance {
 
     pub(crate) fn state(&self) -> Result<InstanceState, FmuError> {
         let model = self.model.is_started().then(|| self.model.state()).transpose()?;
-        Ok(InstanceState { phase: self.phase, begin_s: self.begin_s, model, values: self.model.values().to_vec() })
+        Ok(InstanceState { phase: self.phase, begin_s: self.begin_s, model, values: self.model.values.clone() })
     }
 
     pub(crate) fn restore(&mut self, state: &InstanceState) -> Result<(), FmuError> {

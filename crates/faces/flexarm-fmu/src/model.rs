@@ -1,4 +1,10 @@
 //! An arm with named inputs and outputs, stepped by another program.
+//!
+//! Start at [`FmuModel`]: made, set, started, then stepped (co-simulation) or evaluated (model
+//! exchange, `exchange.rs`). Values are SI numbers in the order of the variables; poses, twists and
+//! wrenches are those of the TCP in world axes, linear first.
+//!
+//! Not here: names and units of variables (`variables.rs`), phases and C (`instance.rs`, `ffi`).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -19,7 +25,7 @@ const SAME_TIME: f64 = 1e-3;
 const SHORTEST: f64 = 1e-3;
 
 /// Settings for making a plant of a robot.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct FmuSettings {
     /// Options for loading the robot.
     pub load: LoadOptions,
@@ -31,13 +37,6 @@ pub struct FmuSettings {
     pub step_s: Option<f64>,
     /// Joint positions at the start (rad or m); zero if `None`.
     pub pose: Option<Vec<f64>>,
-}
-
-impl Default for FmuSettings {
-    fn default() -> Self {
-        let (load, modelling) = (LoadOptions::default(), Modelling::default());
-        Self { load, modelling, stepper: StepperKind::default(), step_s: None, pose: None }
-    }
 }
 
 /// Source of the motion of a started arm.
@@ -103,6 +102,7 @@ impl FmuModel {
         let options = options(settings, None);
         let pose = first_pose(&arm, settings);
         let live = arm.live(Some(&pose), options.step_s, &options)?;
+        // What the variables depend on: the arm at its first pose, and whether it has equations of motion.
         let has_acceleration = !settings.stepper.entry().maximal;
         let equations = arm.equations(Some(&pose), &LiveOptions::default()).ok();
         let equations = equations.filter(|own| has_acceleration && !own.coordinates().is_empty());
@@ -117,6 +117,7 @@ impl FmuModel {
             gauges: &live.gauge_channels(),
             elastic: elastic.as_deref(),
         };
+        // The list of variables is complete; outputs are those of the arm at rest.
         let variables: Arc<[Variable]> = variables(&arm, &starts).into();
         let values = variables.iter().map(|variable| variable.start.unwrap_or(0.0)).collect();
         let (path, settings, states) = (robot.path.clone(), settings.clone(), StateReferences::of(&variables));
@@ -224,11 +225,6 @@ impl FmuModel {
         self.values[reference] = value;
         self.make_stale();
         Ok(())
-    }
-
-    /// Returns the value of every variable.
-    pub(crate) fn values(&self) -> &[f64] {
-        &self.values
     }
 
     /// Returns to parameters and inputs of before the start.
@@ -342,12 +338,16 @@ impl FmuModel {
     /// The first step chooses a shorter solver step if its length is no multiple of the parameter
     /// `step`.
     ///
+    /// * `from_s`: time of the caller at the begin of the step (s); that of the plant, within a
+    ///   thousandth of `length_s`. `length_s`: length of the step (s), positive.
+    ///
     /// # Errors
     /// [`FmuError::NotStarted`]; [`FmuError::Step`] if `from_s` is not the time of the plant, and
     /// for a first step below a thousandth of the parameter `step`;
     /// [`FmuError::Robot`] for a length that is no multiple of the solver step, and for a step
     /// that fails.
     pub fn step(&mut self, from_s: f64, length_s: f64) -> Result<(), FmuError> {
+        // The step must continue from where the plant is.
         let own_s = self.time_s();
         match &self.running {
             None => return Err(FmuError::NotStarted),
@@ -365,6 +365,7 @@ impl FmuModel {
             let what = format!("the communication step starts at {from_s} s, the arm is at {own_s} s");
             return Err(FmuError::Step(what));
         }
+        // The first step decides on the solver's step: a whole number of them fills it.
         if self.steps == 0 {
             let step_s = self.parameter(Meaning::Step, 0.0);
             let count = length_s / step_s;
@@ -379,6 +380,7 @@ impl FmuModel {
                 self.running = Some(Running::Steps(Box::new(live)));
             }
         }
+        // The inputs hold for the whole step; targets are those at its end.
         let (q, qdot, torque) =
             (self.all(Meaning::TargetPosition), self.all(Meaning::TargetVelocity), self.all(Meaning::Torque));
         let wrench = self.wrench();
@@ -394,6 +396,7 @@ impl FmuModel {
         Ok(())
     }
 
+    /// Returns the input wrench on the arm at the TCP, world axes (N, N m).
     pub(crate) fn wrench(&self) -> Wrench {
         let F: [f64; 6] = std::array::from_fn(|k| self.parameter(Meaning::Wrench(k), 0.0));
         let mut wrench = Wrench::zeros();
@@ -448,6 +451,7 @@ impl FmuModel {
         let (link_position, link_velocity) = (live.link_position(), live.link_velocity());
         let (tcp, rigid, V) = (live.tcp_pose(), live.target_pose(), live.tcp_velocity());
         let (a, gauges) = (live.tcp_acceleration(), live.gauges());
+        // Error of the TCP: translation and rotation vector from the rigid to the flexible one.
         let error = tcp.translation.vector - rigid.translation.vector;
         let turned = (tcp.rotation * rigid.rotation.inverse()).scaled_axis();
         let (own, of_rigid) = (quaternion(&tcp), quaternion(&rigid));

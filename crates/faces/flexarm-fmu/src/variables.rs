@@ -1,7 +1,9 @@
 //! Variables of a plant: names, units, causality, start values.
 //!
 //! A variable is found by its reference, the position in the list. Names are structured as FMI asks:
-//! `joint.joint_1.target_position`, `tcp.position.x`.
+//! `joint.joint_1.target_position`, `tcp.position.x`. Start at [`variables`]; a [`Meaning`] ties a
+//! variable to the quantity of the arm. Positions, velocities and wrenches are in world axes.
+//! Not here: the values (`model.rs`).
 
 use std::fmt::Write as _;
 
@@ -263,6 +265,7 @@ impl List {
         let (input, output) = (Causality::Input, Causality::Output);
         let start = starts.pose.get(k).copied().unwrap_or(0.0);
         let holding = starts.holding.get(k).copied().unwrap_or(0.0);
+        // Commands.
         let text = "Target at the end of the communication step; the arm starts at rest there";
         self.add(input, of_joint("target_position"), text, position, Some(start), Meaning::TargetPosition(k));
         let text = "Target velocity at the end of the communication step, used with use_target_velocity";
@@ -278,6 +281,7 @@ impl List {
             );
             self.add(input, of_joint("torque"), text, effort, Some(0.0), Meaning::Torque(k));
         }
+        // Motions and effort.
         let outputs = [
             ("motor_position", "Position of the motor, at the joint", position, Meaning::MotorPosition(k)),
             ("motor_velocity", "Velocity of the motor, at the joint", velocity, Meaning::MotorVelocity(k)),
@@ -289,6 +293,7 @@ impl List {
         for (what, text, unit, meaning) in outputs {
             self.add(output, of_joint(what), text, unit, None, meaning);
         }
+        // The motor of a driven joint is a state: position, velocity, acceleration.
         if is_driven && starts.elastic.is_some() {
             let (name, text) = (of_joint("motor_acceleration"), "Acceleration of the motor, at the joint");
             self.0[first + 1].derivative_of = Some(first);
@@ -328,6 +333,7 @@ impl List {
         }
     }
 
+    /// Adds time, parameters and the inputs of the whole arm.
     fn parameters(&mut self, starts: &Starts<'_>) {
         self.add(Causality::Independent, "time", "Time", "s", None, Meaning::Time);
         let parameter = Causality::Parameter;
@@ -349,7 +355,9 @@ impl List {
         self.add(parameter, "use_target_velocity", text, "", Some(0.0), Meaning::UseTargetVelocity);
     }
 
+    /// Adds wrench, motion and error of the TCP.
     fn tcp(&mut self, has_acceleration: bool) {
+        // Input: the wrench on the TCP.
         for (i, (part, unit)) in [("force", "N"), ("torque", "N.m")].into_iter().enumerate() {
             for (k, axis) in AXES.iter().enumerate() {
                 let (name, text) = (format!("tcp.{part}.{axis}"), format!("External {part} on the TCP, world axes"));
@@ -367,6 +375,7 @@ impl List {
                 list.add(output, format!("{name}.{part}"), text, "1", None, meaning(k));
             }
         };
+        // Outputs: the flexible TCP, the rigid one, and their difference.
         vector(self, "tcp.position", "Position of the TCP, world", "m", &Meaning::TcpPosition);
         let text = "Orientation of the TCP, unit quaternion with w >= 0";
         quaternion(self, "tcp.orientation", text, &Meaning::TcpQuaternion);

@@ -178,9 +178,13 @@ fn arms_without_equations_and_wrong_states_are_refused() {
     let kept = model.states();
     assert!(matches!(model.set_states(&vec![f64::NAN; kept.len()]), Err(FmuError::Value { .. })));
     assert!(matches!(model.set_time(f64::INFINITY), Err(FmuError::Value { .. })));
+    let short = model.set_states(&kept[1..]).unwrap_err().to_string();
+    assert!(short.contains(&format!("{} value(s) given, expected {}", kept.len() - 1, kept.len())), "{short}");
     let [output, state] = [model.find("tcp.position.x").unwrap(), model.state_references()[0]];
     let wrong = model.directional_derivative(&[output], &[output], &[1.0]);
     assert!(matches!(wrong, Err(FmuError::Variable(_))));
+    let seedless = model.directional_derivative(&[output], &[state], &[]);
+    assert!(matches!(seedless, Err(FmuError::Length { found: 0, expected: 1, .. })));
     assert!(model.directional_derivative(&[output], &[state], &[1.0]).unwrap()[0].is_finite());
     assert_eq!(model.states(), kept);
 }

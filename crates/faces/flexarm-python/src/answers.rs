@@ -1,4 +1,8 @@
 //! Results at a pose: statics, modes, frequency response.
+//!
+//! Each class has the numbers of a result of the library and gives them as read-only views. World
+//! axes at the TCP, linear first; m, rad, N, N m, Hz. Not here: how they are computed
+//! (`flexarm::poses`).
 
 use flexarm::poses::{ModeTable, OperatingPoint, OperatingPoints, Quantity, Response, ResponseRequest, Spacing};
 use pyo3::prelude::*;

@@ -1,4 +1,9 @@
 //! Arms: robots with their flexible links and drives, evaluated with numpy arrays.
+//!
+//! Start at `Arm.simulate` and `Arm.statics`. Arrays are SI, row-major, with the joints in the
+//! order of `Arm.joints`; poses, errors and wrenches in world axes at the TCP, linear first. Not
+//! here: classes of results (`run.rs`, `answers.rs`, `linear.rs`), conversion of arguments
+//! (`run_arguments.rs`, `values.rs`, `arrays.rs`).
 
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 

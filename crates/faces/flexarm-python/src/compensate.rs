@@ -1,4 +1,6 @@
 //! Joint commands with which a flexible arm's TCP follows the rigid one's.
+//!
+//! Errors in m, world axes. Not here: the inverse model and input shapers (`flexarm::compensate`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,7 @@
 //! TCP deflections of many runs, given as lists of runs or as arrays of parameters.
+//!
+//! A parameter has one value for all runs or one for each; all lengths must agree. Results are in m
+//! and s, world axes. Not here: the runs (`flexarm::runs`).
 
 use flexarm::runs::{ToolDeflection, Variation};
 use flexarm::{PayloadChange, Scenario};

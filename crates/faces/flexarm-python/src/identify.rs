@@ -1,4 +1,7 @@
 //! Parameters from measurements, and plans of poses to measure.
+//!
+//! Answers are dictionaries with the keys of `--json`. Not here: least squares
+//! (`flexarm::identify`).
 
 use std::path::PathBuf;
 

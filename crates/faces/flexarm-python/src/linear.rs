@@ -1,4 +1,7 @@
 //! The linear system about an equilibrium.
+//!
+//! `Linear` has the matrices of its equation of motion, row-major; the equation stands at the
+//! class. Not here: linearisation (`flexarm::poses`).
 
 use flexarm::poses::Linear;
 use pyo3::prelude::*;

@@ -1,4 +1,6 @@
 //! Links from meshes and matrices, and their export.
+//!
+//! Lengths in m unless a unit system is named. Not here: the jobs (`flexarm::links`).
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,4 +1,7 @@
 //! An arm that is commanded while it moves.
+//!
+//! `Live.step` holds a command for one period; the properties are those at its end: rad or m, N m
+//! or N; poses 4 x 4 in the world. Not here: whole runs (`arm.rs`).
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,4 +1,6 @@
 //! Chatter-free depth of cut.
+//!
+//! Speeds in rpm, depths in m. Not here: the stability of milling (`flexarm::lobes`).
 
 use std::path::{Path, PathBuf};
 

@@ -1,4 +1,7 @@
 //! Maps of the workspace.
+//!
+//! `map` takes poses or a region and returns arrays with a row for each pose: m, rad, N/m, Hz;
+//! world axes. Not here: poses and quantities (`flexarm::map`).
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;

@@ -1,4 +1,8 @@
 //! Rigid-body algorithms on arrays, for users with their own dynamics.
+//!
+//! Coordinates are actuated joints, then elastic ones; a leading axis is a batch. Wrenches, twists
+//! and Jacobians: world axes at the origin of the frame, linear first. Not here: the algorithms
+//! (`flexarm-kinematics`).
 
 use std::sync::Arc;
 

@@ -1,4 +1,7 @@
 //! Motions: joint positions over time.
+//!
+//! A `Motion` is bound to a robot, or made of arrays of time (s) and joint positions (rad or m) and
+//! bound when it is used. Not here: loads and payloads (`scenario.rs`).
 
 use std::path::PathBuf;
 

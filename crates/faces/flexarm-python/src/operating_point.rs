@@ -1,4 +1,7 @@
 //! Successive poses in a workspace.
+//!
+//! One workspace is solved at pose after pose without allocation. World axes at the TCP, linear
+//! first; m, rad, N, N m, Hz.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 

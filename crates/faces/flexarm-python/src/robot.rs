@@ -1,4 +1,6 @@
-//! Robots as loaded.
+//! Robots as loaded: from a folder, a file, a description, or keys of a robot file.
+//!
+//! Not here: methods of a robot (`robot_methods.rs`), arms (`arm.rs`).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,4 +1,7 @@
 //! Methods of robots: arms, motions and figures made of them.
+//!
+//! Joints are in the order of `Robot.joints`; positions in rad or m. Not here: loading
+//! (`robot.rs`).
 
 use std::path::Path;
 

@@ -1,4 +1,8 @@
 //! Runs: figures, and every logged sample as columns.
+//!
+//! `Run` has a column for each signal: n samples, row-major, SI units, world axes unless the name
+//! says path. `Sample` is one of them, for an observer. Not here: tables for other programs
+//! (`table.rs`).
 
 use flexarm::Run;
 use flexarm::recordings::{Column, Columns, Sample};

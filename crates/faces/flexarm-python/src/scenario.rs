@@ -1,4 +1,7 @@
 //! Scenarios of a run: motion, loads, payloads, initial state.
+//!
+//! A `Load` is a wrench over time at a frame (N, N m, world axes, force first); a `Payload` is a
+//! mass that is attached or released at a time. Not here: runs (`arm.rs`).
 
 use flexarm::motions::AppliedLoad;
 use flexarm::{Motion, PayloadChange, Scenario, Wrench};

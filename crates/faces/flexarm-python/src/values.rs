@@ -1,4 +1,7 @@
-//! Conversion of words and plain values.
+//! Conversion of words, paths, whole numbers and wrenches to the library's types.
+//!
+//! A wrong value is a `ValueError` or `TypeError` that names the argument, what was found and what
+//! is expected. Not here: arrays (`arrays.rs`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,6 @@
 //! Long calls: they release the GIL, Ctrl-C stops them, and they report progress.
+//!
+//! Start at [`stoppable`]: the work runs without the GIL and asks now and then whether to stop.
 
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};

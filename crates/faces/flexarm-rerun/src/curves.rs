@@ -1,4 +1,8 @@
 //! Curves of a run, grouped by plot.
+//!
+//! Values are pushed in the order in which the tracks are made: [`Curves::new`] and
+//! [`Curves::push_causes`] mirror each other. Errors in mm and mrad, the rest in SI units. Not
+//! here: axis ranges (`plot_range.rs`).
 
 use rerun::{Color, EntityPath, TimeColumn};
 

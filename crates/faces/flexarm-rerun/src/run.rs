@@ -1,4 +1,8 @@
 //! One run in a recording: its robots, TCP paths, curves and events.
+//!
+//! Start at [`RunTracks`]: made from a header, fed with samples, closed with a result. Poses are
+//! those of links and TCP in the world (m). Not here: rows and chunks (`tracks.rs`), meshes
+//! (`robot.rs`), the layout of the window (`window.rs`).
 
 use rerun::{
     Color, EntityPath, LineStrip3D, LineStrips3D, Points3D, Radius, Scalars, SeriesPoints, TextDocument, TextLog,

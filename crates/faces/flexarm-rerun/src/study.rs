@@ -1,4 +1,7 @@
 //! Several runs in one recording, drawn over each other.
+//!
+//! The runs share one file: each locks it while it writes. Not here: the contents of a run
+//! (`run.rs`).
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

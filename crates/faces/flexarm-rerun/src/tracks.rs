@@ -1,4 +1,7 @@
 //! Rows waiting to be written as columns: one track per time-dependent entity.
+//!
+//! Start at [`Track`]. A track keeps rows until they are worth a chunk, and leaves out rows that
+//! repeat the one before. Times in ns of simulated time; poses in the world, single precision (m).
 
 use flexarm_kinematics::Pose;
 use nalgebra::UnitQuaternion;

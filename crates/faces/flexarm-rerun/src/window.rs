@@ -1,4 +1,6 @@
 //! Layout of the viewer for one or several runs: robots on the left, plots and text on the right.
+//!
+//! Not here: how a layout is encoded (`layout.rs`), what is drawn (`run.rs`).
 
 use rerun::EntityPath;
 

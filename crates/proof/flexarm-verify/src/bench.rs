@@ -1,5 +1,10 @@
 //! Helpers shared by the cases: shipped files, arms held at a pose, loads, and a stepper that runs
 //! until the arm is at rest.
+//!
+//! Start at `Rig`: an arm with its joints at zero and the frame that is loaded and watched.
+//! Six-vectors are displacement and rotation, or force and moment, of that frame in world axes (m,
+//! rad; N, N m), linear first. `Worst` keeps NaN. Not here: closed forms (`textbook.rs`), meshes
+//! (`meshed.rs`).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -34,7 +39,7 @@ pub struct Bench {
 
 impl Bench {
     /// Loads a shipped robot, by its path relative to the root.
-    pub fn robot(&self, file: &str) -> Result<Robot, Error> {
+    pub(crate) fn robot(&self, file: &str) -> Result<Robot, Error> {
         let path = self.root.join(file);
         if !path.is_file() {
             let what = "there is no such file; the case studies need robots, trajectories and tests of a checkout of the \
@@ -45,17 +50,17 @@ impl Bench {
     }
 
     /// Path of a shipped file.
-    pub fn file(&self, file: &str) -> PathBuf {
+    pub(crate) fn file(&self, file: &str) -> PathBuf {
         self.root.join(file)
     }
 
     /// Loads a shipped motion.
-    pub fn motion(&self, robot: &Robot, file: &str) -> Result<Motion, Error> {
+    pub(crate) fn motion(&self, robot: &Robot, file: &str) -> Result<Motion, Error> {
         Ok(Motion::load_for(&self.root.join(file), &*robot.rigid_model()?)?)
     }
 
     /// Reads stored results of another program from `tests/verification/<name>`.
-    pub fn stored(&self, name: &str) -> Result<Stored, Error> {
+    pub(crate) fn stored(&self, name: &str) -> Result<Stored, Error> {
         Stored::read(&self.root.join("tests/verification").join(name))
     }
 }
@@ -73,7 +78,7 @@ pub(crate) fn columns<const N: usize>(path: &Path, names: [&str; N]) -> Result<V
 
 /// Results of another program, with their provenance.
 #[derive(Clone, Debug)]
-pub struct Stored {
+pub(crate) struct Stored {
     path: PathBuf,
     value: Value,
 }
@@ -88,30 +93,30 @@ impl Stored {
     }
 
     /// Returns program, script and date in one line.
-    pub fn provenance(&self) -> String {
+    pub(crate) fn provenance(&self) -> String {
         let word = |key: &str| self.value[key].as_str().unwrap_or("?").to_owned();
         format!("{} ({}, {})", word("program"), word("script"), word("date"))
     }
 
     /// Returns the value at a path of keys and indices, such as `a/0/b`.
-    pub fn at(&self, pointer: &str) -> Result<&Value, Error> {
+    pub(crate) fn at(&self, pointer: &str) -> Result<&Value, Error> {
         self.value.pointer(&format!("/{pointer}")).ok_or_else(|| self.fault(pointer, "is missing"))
     }
 
     /// Returns a number.
-    pub fn number(&self, pointer: &str) -> Result<f64, Error> {
+    pub(crate) fn number(&self, pointer: &str) -> Result<f64, Error> {
         self.at(pointer)?.as_f64().ok_or_else(|| self.fault(pointer, "is no number"))
     }
 
     /// Returns a list of numbers.
-    pub fn numbers(&self, pointer: &str) -> Result<Vec<f64>, Error> {
+    pub(crate) fn numbers(&self, pointer: &str) -> Result<Vec<f64>, Error> {
         let list = self.at(pointer)?.as_array().ok_or_else(|| self.fault(pointer, "is no list"))?;
         let numbers = list.iter().map(Value::as_f64).collect::<Option<Vec<f64>>>();
         numbers.ok_or_else(|| self.fault(pointer, "has something that is no number"))
     }
 
     /// Returns a six-vector.
-    pub fn vector6(&self, pointer: &str) -> Result<Vector6<f64>, Error> {
+    pub(crate) fn vector6(&self, pointer: &str) -> Result<Vector6<f64>, Error> {
         let numbers = self.numbers(pointer)?;
         if numbers.len() == 6 {
             Ok(Vector6::from_column_slice(&numbers))
@@ -121,7 +126,7 @@ impl Stored {
     }
 
     /// Returns a 6x6 matrix, stored by rows.
-    pub fn matrix6(&self, pointer: &str) -> Result<Matrix6<f64>, Error> {
+    pub(crate) fn matrix6(&self, pointer: &str) -> Result<Matrix6<f64>, Error> {
         let mut matrix = Matrix6::zeros();
         for row in 0..6 {
             matrix.set_row(row, &self.vector6(&format!("{pointer}/{row}"))?.transpose());
@@ -136,48 +141,49 @@ impl Stored {
 }
 
 /// Generalised-alpha with the settings of an ordinary run.
-pub const ALPHA: StepperKind = StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
+pub(crate) const ALPHA: StepperKind =
+    StepperKind::GeneralizedAlpha(AlphaSettings { rho: 0.9, dispersion_correction: true });
 
 /// SPOOK with compliant constraints in their exact form.
-pub const fn spook(form: ConstraintForm) -> StepperKind {
+pub(crate) const fn spook(form: ConstraintForm) -> StepperKind {
     StepperKind::Spook(SpookSettings { form, preset: SpookPreset::Exact })
 }
 
 /// The three steppers for lumped links.
-pub const LUMPED: [(&str, StepperKind); 3] = [
+pub(crate) const LUMPED: [(&str, StepperKind); 3] = [
     ("compliant constraints, local", spook(ConstraintForm::Local)),
     ("compliant constraints, global", spook(ConstraintForm::Global)),
     ("spring-damper", ALPHA),
 ];
 
 /// Modelling with lumped links of `n` rigid parts.
-pub fn parts(n: usize) -> Modelling {
+pub(crate) fn parts(n: usize) -> Modelling {
     Modelling { links: LinkModel::Lumped, segments: Some(n), ..Modelling::default() }
 }
 
 /// Modelling with modal links.
-pub fn modal(modes: usize) -> Modelling {
+pub(crate) fn modal(modes: usize) -> Modelling {
     Modelling { links: LinkModel::Modal, modes: Some(modes), ..Modelling::default() }
 }
 
 /// Lumped links of `n` rigid parts, with their name on the page.
-pub fn in_parts(n: usize) -> (String, Modelling) {
+pub(crate) fn in_parts(n: usize) -> (String, Modelling) {
     (format!("{n} parts"), parts(n))
 }
 
 /// Modal links, with their name on the page.
-pub fn in_modes(modes: usize) -> (String, Modelling) {
+pub(crate) fn in_modes(modes: usize) -> (String, Modelling) {
     (format!("modal, {modes} modes"), modal(modes))
 }
 
 /// Returns the robot without gravity.
-pub fn weightless(mut robot: Robot) -> Robot {
+pub(crate) fn weightless(mut robot: Robot) -> Robot {
     robot.rigid.gravity = Vector3::zeros();
     robot
 }
 
 /// Returns the robot with its first mode critically damped, so that it comes to rest quickly.
-pub fn damped(mut robot: Robot) -> Robot {
+pub(crate) fn damped(mut robot: Robot) -> Robot {
     for link in &mut robot.flexible_links {
         link.damping = Damping::Modal(1.0);
     }
@@ -185,18 +191,18 @@ pub fn damped(mut robot: Robot) -> Robot {
 }
 
 /// An arm with its joints held at zero, and the frame at which it is loaded and observed.
-pub struct Rig {
+pub(crate) struct Rig {
     /// The arm.
-    pub plant: Plant,
+    pub(crate) plant: Plant,
     /// The frame.
-    pub frame: Frame,
+    pub(crate) frame: Frame,
     /// Pose of the frame in the undeformed arm.
-    pub X_WF: Pose,
+    pub(crate) X_WF: Pose,
 }
 
 impl Rig {
     /// Creates a rig at a named frame of the robot, or at its TCP if `frame` is `None`.
-    pub fn new(robot: &Robot, modelling: &Modelling, frame: Option<&str>) -> Result<Self, Error> {
+    pub(crate) fn new(robot: &Robot, modelling: &Modelling, frame: Option<&str>) -> Result<Self, Error> {
         let arm = robot.model(modelling)?;
         let joints = vec![0.0; arm.model.n_actuated()];
         let plant = arm.plant(Arc::new(Held(joints))).map_err(step_error)?;
@@ -209,7 +215,7 @@ impl Rig {
 
     /// Returns the same arm, observed at the point of a body that is at `p_W` (world axes) when
     /// undeformed.
-    pub fn at_point(&self, body: usize, p_W: Vector3<f64>) -> Self {
+    pub(crate) fn at_point(&self, body: usize, p_W: Vector3<f64>) -> Self {
         let e = DVector::zeros(self.plant.model.n_elastic());
         let body_only = Frame { body, X_BF: Pose::identity(), ..self.frame.clone() };
         let X_WB = place(&self.plant, &body_only, &e);
@@ -221,7 +227,7 @@ impl Rig {
     /// Returns the frequencies (Hz), ascending, of the modes in which the frame moves mainly along
     /// y and mainly along z (world axes). Modes that mainly rotate it or move it along x are left
     /// out.
-    pub fn bending_hz(&self) -> [Vec<f64>; 2] {
+    pub(crate) fn bending_hz(&self) -> [Vec<f64>; 2] {
         let modes = &self.plant.modes;
         let mut found = [Vec::new(), Vec::new()];
         for (shape, hz) in modes.shapes.column_iter().zip(modes.frequencies_hz()) {
@@ -239,7 +245,7 @@ impl Rig {
     }
 
     /// Returns the arm under a wrench at the frame, world axes.
-    pub fn loaded(&self, wrench: &Vector6<f64>) -> Result<Plant, Error> {
+    pub(crate) fn loaded(&self, wrench: &Vector6<f64>) -> Result<Plant, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         let load = Load { body: self.frame.body, X_BF: self.frame.X_BF, wrench: TimedWrench::new(move |_| F) };
         self.plant.clone().with_timed_loads(vec![load]).map_err(step_error)
@@ -247,19 +253,19 @@ impl Rig {
 
     /// Computes the displacement and rotation of the frame in equilibrium under a wrench at the
     /// frame, by Newton's method.
-    pub fn statics(&self, wrench: &Vector6<f64>) -> Result<Vector6<f64>, Error> {
+    pub(crate) fn statics(&self, wrench: &Vector6<f64>) -> Result<Vector6<f64>, Error> {
         self.statics_at(wrench, self)
     }
 
     /// Like [`Rig::statics`], but observes the frame of another rig of the same arm.
-    pub fn statics_at(&self, wrench: &Vector6<f64>, observed: &Self) -> Result<Vector6<f64>, Error> {
+    pub(crate) fn statics_at(&self, wrench: &Vector6<f64>, observed: &Self) -> Result<Vector6<f64>, Error> {
         let plant = self.loaded(wrench)?;
         let e = static_equilibrium(&plant, 0.0).map_err(step_error)?;
         Ok(Vector6::from(tcp_error(&observed.X_WF, &place(&plant, &observed.frame, &e))))
     }
 
     /// Like [`Rig::statics`], but steps in time from the undeformed arm until it is at rest.
-    pub fn settled(&self, wrench: &Vector6<f64>, kind: StepperKind, h: f64) -> Result<Vector6<f64>, Error> {
+    pub(crate) fn settled(&self, wrench: &Vector6<f64>, kind: StepperKind, h: f64) -> Result<Vector6<f64>, Error> {
         const AT_MOST: usize = 100_000;
         const BETWEEN: usize = 50;
         let plant = self.loaded(wrench)?;
@@ -289,7 +295,13 @@ impl Rig {
     /// there, sampled at the start and every `every` seconds.
     ///
     /// * `h`: step size (s); `every` is a multiple of it.
-    pub fn path(&self, kind: StepperKind, h: f64, every: f64, duration: f64) -> Result<Vec<Vector3<f64>>, Error> {
+    pub(crate) fn path(
+        &self,
+        kind: StepperKind,
+        h: f64,
+        every: f64,
+        duration: f64,
+    ) -> Result<Vec<Vector3<f64>>, Error> {
         let mut stepper = new_stepper(kind, self.plant.clone(), h, Start::Undeformed).map_err(step_error)?;
         let mut observed = Observation::new(&self.plant);
         let (stride, steps) = ((every / h).round() as usize, (duration / h).round() as usize);
@@ -309,7 +321,7 @@ impl Rig {
     /// second-order effects.
     ///
     /// `loads`: magnitude of each load; `response`: displacement under a wrench.
-    pub fn compliance(
+    pub(crate) fn compliance(
         &self,
         loads: &Vector6<f64>,
         mut response: impl FnMut(&Self, &Vector6<f64>) -> Result<Vector6<f64>, Error>,
@@ -326,13 +338,13 @@ impl Rig {
 }
 
 /// Ratio of damping to stiffness in [`tool_path`] (s).
-pub const PATH_DAMPING_S: f64 = 5e-4;
+pub(crate) const PATH_DAMPING_S: f64 = 5e-4;
 
 /// Computes the TCP positions after each step of generalised-alpha, world axes.
 ///
 /// `stiffening`: whether loads change the stiffness of modal links. Damping is [`PATH_DAMPING_S`]
 /// times stiffness in every model.
-pub fn tool_path(
+pub(crate) fn tool_path(
     robot: &Robot,
     modelling: &Modelling,
     stiffening: bool,
@@ -360,7 +372,7 @@ pub fn tool_path(
 
 /// Computes the pose of a frame for given elastic coordinates, with the joints at their prescribed
 /// start.
-pub fn place(plant: &Plant, frame: &Frame, e: &DVector<f64>) -> Pose {
+pub(crate) fn place(plant: &Plant, frame: &Frame, e: &DVector<f64>) -> Pose {
     let model = &plant.model;
     let (mut data, mut state) = (Data::new(model), State::zeros(model));
     plant.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
@@ -370,26 +382,26 @@ pub fn place(plant: &Plant, frame: &Frame, e: &DVector<f64>) -> Pose {
 }
 
 /// A motion well above rounding and well below geometric nonlinearity (m, rad).
-pub const SMALL_MOTION: f64 = 1e-5;
+pub(crate) const SMALL_MOTION: f64 = 1e-5;
 
 /// Computes loads that each move a point with compliance `C` by [`SMALL_MOTION`].
-pub fn small_loads(C: &Matrix6<f64>) -> Vector6<f64> {
+pub(crate) fn small_loads(C: &Matrix6<f64>) -> Vector6<f64> {
     Vector6::from_fn(|j, _| SMALL_MOTION / C[(j, j)])
 }
 
 /// Maximum error of the response to load `j`, each entry relative to `sqrt(C_ii C_jj)`.
-pub fn column_error(C: &Matrix6<f64>, truth: &Matrix6<f64>, j: usize) -> f64 {
+pub(crate) fn column_error(C: &Matrix6<f64>, truth: &Matrix6<f64>, j: usize) -> f64 {
     let scale = |i: usize| (truth[(i, i)] * truth[(j, j)]).sqrt();
     (0..6).map(|i| (C[(i, j)] - truth[(i, j)]).abs() / scale(i)).worst()
 }
 
 /// Maximum of [`column_error`] over all loads.
-pub fn compliance_error(C: &Matrix6<f64>, truth: &Matrix6<f64>) -> f64 {
+pub(crate) fn compliance_error(C: &Matrix6<f64>, truth: &Matrix6<f64>) -> f64 {
     (0..6).map(|j| column_error(C, truth, j)).worst()
 }
 
 /// Relative errors of the translation and of the rotation of a six-vector, each as a vector norm.
-pub fn shift_and_turn_errors(u: &Vector6<f64>, truth: &Vector6<f64>) -> [f64; 2] {
+pub(crate) fn shift_and_turn_errors(u: &Vector6<f64>, truth: &Vector6<f64>) -> [f64; 2] {
     [0, 3].map(|from| {
         let truth = truth.fixed_rows::<3>(from);
         (u.fixed_rows::<3>(from) - truth).norm() / truth.norm()
@@ -397,17 +409,17 @@ pub fn shift_and_turn_errors(u: &Vector6<f64>, truth: &Vector6<f64>) -> [f64; 2]
 }
 
 /// Maximum distance between two paths sampled at the same instants (m).
-pub fn farthest(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
+pub(crate) fn farthest(a: &[Vector3<f64>], b: &[Vector3<f64>]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).norm()).worst()
 }
 
 /// Returns the larger of two errors; NaN wins, whereas `f64::max` would drop it.
-pub fn larger(a: f64, b: f64) -> f64 {
+pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
 /// Maximum absolute value of a sequence of errors.
-pub trait Worst: Iterator<Item = f64> + Sized {
+pub(crate) trait Worst: Iterator<Item = f64> + Sized {
     /// Returns NaN if one of them is NaN or if there are none: then nothing was compared.
     fn worst(self) -> f64 {
         self.map(f64::abs).reduce(larger).unwrap_or(f64::NAN)
@@ -417,16 +429,16 @@ pub trait Worst: Iterator<Item = f64> + Sized {
 impl<I: Iterator<Item = f64>> Worst for I {}
 
 /// Names of the six loads.
-pub const LOADS: [&str; 6] = ["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"];
+pub(crate) const LOADS: [&str; 6] = ["F_x", "F_y", "F_z", "M_x", "M_y", "M_z"];
 
 /// Wraps a step error.
-pub fn step_error(source: StepError) -> Error {
+pub(crate) fn step_error(source: StepError) -> Error {
     flexarm::Error::Step { source, partial: false }.into()
 }
 
 /// Computes the displacement and rotation of a frame under gravity `g` (m/s², world axes),
 /// linearised: the difference of the responses to plus and minus a hundredth of `g`, scaled up.
-pub fn weight_response(
+pub(crate) fn weight_response(
     robot: &Robot,
     modelling: &Modelling,
     frame: Option<&str>,

@@ -32,7 +32,7 @@ pub struct Difference {
 /// Returns the lines in which two pages differ.
 ///
 /// * `page`: the stored file.
-pub fn differences(page: &Path, stored: &str, found: &str) -> Vec<Difference> {
+pub(crate) fn differences(page: &Path, stored: &str, found: &str) -> Vec<Difference> {
     let (stored, found): (Vec<&str>, Vec<&str>) = (stored.lines().collect(), found.lines().collect());
     (0..stored.len().max(found.len()))
         .filter_map(|k| {
@@ -50,7 +50,7 @@ fn same_line(a: &str, b: &str) -> bool {
 }
 
 /// Returns whether two pictures agree within the tolerances.
-pub fn same_picture(a: &str, b: &str) -> bool {
+pub(crate) fn same_picture(a: &str, b: &str) -> bool {
     let close = |(a, b): (&Piece, &Piece)| match (a, b) {
         (Piece::Number { value: a, .. }, Piece::Number { value: b, .. }) => (a - b).abs() <= COORDINATE,
         (a, b) => a == b,

@@ -1,4 +1,6 @@
-//! The pages and the files that belong to them.
+//! The pages and the files that belong to them: written as a whole, or compared with stored ones.
+//!
+//! Not here: the Markdown of a case (`page.rs`), tolerances of a comparison (`check.rs`).
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +11,7 @@ use crate::page::{Case, Claim, Table, markdown, table_text, word};
 use crate::{Error, Verification};
 
 /// File name of the first page.
-pub const PAGE: &str = "verification.md";
+const PAGE: &str = "verification.md";
 /// Folder of the pages of the cases and of the pictures, next to the first page.
 const CASES: &str = "verification";
 /// File with every number at full precision.

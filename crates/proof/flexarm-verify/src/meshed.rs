@@ -1,4 +1,7 @@
 //! Shipped meshes, assembled and condensed on the fly: the truth for reduced links.
+//!
+//! [`Meshed`] is a mesh with its matrices, [`Condensed`] the same condensed to interfaces A and B.
+//! SI units, axes of the link. Not here: the methods (`flexarm-fem`).
 
 use std::path::{Path, PathBuf};
 

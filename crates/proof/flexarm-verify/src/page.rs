@@ -1,13 +1,13 @@
 //! Content of a verification: cases with text, tables, figures and claims; as Markdown and as JSON.
 //!
-//! Numbers keep their full value until they are printed. Relative errors below [`FLOOR`] are
+//! Numbers keep their full value until they are printed. Relative errors below `FLOOR` are
 //! printed as such: they are rounding and differ between machines.
 
 use flexarm_draw::{Panel, PlotError};
 use serde::Serialize;
 
 /// Relative errors below this are printed as "< 1e-9".
-pub const FLOOR: f64 = 1e-9;
+pub(crate) const FLOOR: f64 = 1e-9;
 
 /// One case study.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -151,37 +151,43 @@ impl Claim {
 
 impl Case {
     /// Creates a case without content.
-    pub fn new(name: &str, title: &str, summary: &str) -> Self {
+    pub(crate) fn new(name: &str, title: &str, summary: &str) -> Self {
         Self { name: name.into(), title: title.into(), summary: summary.into(), blocks: Vec::new() }
     }
 
     /// Adds a heading.
-    pub fn heading(&mut self, text: &str) {
+    pub(crate) fn heading(&mut self, text: &str) {
         self.blocks.push(Block::Heading(text.into()));
     }
 
     /// Adds a paragraph.
-    pub fn text(&mut self, text: impl Into<String>) {
+    pub(crate) fn text(&mut self, text: impl Into<String>) {
         self.blocks.push(Block::Text(text.into()));
     }
 
     /// Adds a table.
-    pub fn table(&mut self, table: Table) {
+    pub(crate) fn table(&mut self, table: Table) {
         self.blocks.push(Block::Table(table));
     }
 
     /// Adds a figure.
-    pub fn figure(&mut self, figure: Figure) {
+    pub(crate) fn figure(&mut self, figure: Figure) {
         self.blocks.push(Block::Figure(figure));
     }
 
     /// Adds a claim; a number that is not finite violates it.
-    pub fn claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
+    pub(crate) fn claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
         self.add_claim(text.into(), truth.into(), measured, bound, false);
     }
 
     /// Adds a claim about stored figures, which no run of today changes.
-    pub fn stored_claim(&mut self, text: impl Into<String>, truth: impl Into<String>, measured: f64, bound: Bound) {
+    pub(crate) fn stored_claim(
+        &mut self,
+        text: impl Into<String>,
+        truth: impl Into<String>,
+        measured: f64,
+        bound: Bound,
+    ) {
         self.add_claim(text.into(), truth.into(), measured, bound, true);
     }
 
@@ -209,7 +215,7 @@ impl Case {
 
 impl Table {
     /// Creates a table with these column heads.
-    pub fn new(caption: impl Into<String>, columns: &[&str]) -> Self {
+    pub(crate) fn new(caption: impl Into<String>, columns: &[&str]) -> Self {
         Self { caption: caption.into(), columns: columns.iter().map(|&c| c.into()).collect(), rows: Vec::new() }
     }
 }
@@ -219,39 +225,39 @@ impl Figure {
     ///
     /// # Errors
     /// If there is nothing to draw.
-    pub fn svg(&self) -> Result<String, PlotError> {
+    pub(crate) fn svg(&self) -> Result<String, PlotError> {
         flexarm_draw::page_plot(&self.x_label, self.logarithmic_x, &self.panels)
     }
 }
 
 /// A word as a cell.
-pub fn word(text: impl Into<String>) -> Cell {
+pub(crate) fn word(text: impl Into<String>) -> Cell {
     Cell::Text(text.into())
 }
 
 /// A number with the given number of decimals.
-pub fn fixed(value: f64, decimals: usize) -> Cell {
+pub(crate) fn fixed(value: f64, decimals: usize) -> Cell {
     Cell::Number { value, format: NumberFormat::Decimals(decimals) }
 }
 
 /// A number with the given number of significant digits.
-pub fn digits(value: f64, digits: usize) -> Cell {
+pub(crate) fn digits(value: f64, digits: usize) -> Cell {
     Cell::Number { value, format: NumberFormat::Digits(digits) }
 }
 
 /// A relative error.
-pub fn error(value: f64) -> Cell {
+pub(crate) fn error(value: f64) -> Cell {
     Cell::Number { value: value.abs(), format: NumberFormat::Error }
 }
 
 /// A relative difference with its sign.
-pub fn signed(value: f64) -> Cell {
+pub(crate) fn signed(value: f64) -> Cell {
     Cell::Number { value, format: NumberFormat::Signed }
 }
 
 impl Cell {
     /// Returns the cell as printed.
-    pub fn print(&self) -> String {
+    pub(crate) fn print(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Number { value, .. } if !value.is_finite() => "-".into(),
@@ -315,7 +321,7 @@ fn significant(x: f64, n: usize) -> String {
 }
 
 /// Returns the page of a case, Markdown; its pictures are in the same folder.
-pub fn markdown(case: &Case) -> String {
+pub(crate) fn markdown(case: &Case) -> String {
     let mut text = format!("# {}\n", case.title);
     for block in &case.blocks {
         match block {
@@ -340,7 +346,7 @@ pub(crate) fn table_text(table: &Table) -> String {
 }
 
 /// Lists the claims of a case.
-pub fn claims_table(case: &Case) -> Table {
+pub(crate) fn claims_table(case: &Case) -> Table {
     let mut table = Table::new("", &["claim", "truth", "measured", "bound", ""]);
     for claim in case.claims() {
         let holds = if claim.holds { "holds" } else { "**does not hold**" };

@@ -7,27 +7,27 @@ use nalgebra::{Matrix3, Matrix6, Vector3};
 
 /// Stiffnesses of a uniform section.
 #[derive(Clone, Copy, Debug)]
-pub struct Stiffness {
+pub(crate) struct Stiffness {
     /// Length (m).
-    pub l: f64,
+    pub(crate) l: f64,
     /// Axial stiffness (N).
-    pub EA: f64,
+    pub(crate) EA: f64,
     /// Bending stiffness about y, for deflection along z (N m²).
-    pub EI_y: f64,
+    pub(crate) EI_y: f64,
     /// Bending stiffness about z, for deflection along y (N m²).
-    pub EI_z: f64,
+    pub(crate) EI_z: f64,
     /// Torsional stiffness (N m²).
-    pub GJ: f64,
+    pub(crate) GJ: f64,
     /// Shear stiffness along y and z (N); infinite for Euler-Bernoulli.
-    pub kGA: [f64; 2],
+    pub(crate) kGA: [f64; 2],
     /// Mass per length (kg/m).
-    pub mu: f64,
+    pub(crate) mu: f64,
 }
 
 impl Stiffness {
     /// Returns the compliance of the end. Gere & Timoshenko, Mechanics of Materials, appendix G;
     /// Cowper for shear.
-    pub fn tip_compliance(&self) -> Matrix6<f64> {
+    pub(crate) fn tip_compliance(&self) -> Matrix6<f64> {
         let Self { l, EA, EI_y, EI_z, GJ, kGA, .. } = *self;
         let mut C = Matrix6::zeros();
         C[(0, 0)] = l / EA;
@@ -45,7 +45,7 @@ impl Stiffness {
 
     /// Returns the deflection along z and the slope `dw/dx` at `x` under a force along z (N) at
     /// `a`, without shear.
-    pub fn under_force(&self, force: f64, a: f64, x: f64) -> [f64; 2] {
+    pub(crate) fn under_force(&self, force: f64, a: f64, x: f64) -> [f64; 2] {
         let k = force / self.EI_y;
         if x <= a {
             [k * x * x * (3.0 * a - x) / 6.0, k * x * (2.0 * a - x) / 2.0]
@@ -55,13 +55,13 @@ impl Stiffness {
     }
 
     /// Returns the same under a moment at `a` that bends the beam towards +z (about -y, N m).
-    pub fn under_moment(&self, moment: f64, a: f64, x: f64) -> [f64; 2] {
+    pub(crate) fn under_moment(&self, moment: f64, a: f64, x: f64) -> [f64; 2] {
         let k = moment / self.EI_y;
         if x <= a { [k * x * x / 2.0, k * x] } else { [k * a * (2.0 * x - a) / 2.0, k * a] }
     }
 
     /// Returns the sag of the end along z under the beam's own weight, without shear.
-    pub fn own_weight(&self, g: f64) -> f64 {
+    pub(crate) fn own_weight(&self, g: f64) -> f64 {
         self.mu * g * self.l.powi(4) / (8.0 * self.EI_y)
     }
 
@@ -70,7 +70,7 @@ impl Stiffness {
     /// clamped solution `w = A (cosh ax - cos bx) + B (sinh ax - (a/b) sin bx)` with `EI w'' = 0`
     /// and `EI w''' + r omega² w' + m omega² w = 0` at the end. Blevins, tables 8-1 and 8-8, for
     /// `r = 0`.
-    pub fn bending_hz(&self, EI: f64, rotary: f64, point_mass: f64, count: usize) -> Vec<f64> {
+    pub(crate) fn bending_hz(&self, EI: f64, rotary: f64, point_mass: f64, count: usize) -> Vec<f64> {
         let (l, mu) = (self.l, self.mu);
         let determinant = |omega: f64| {
             let (c, k) = (rotary * omega * omega / EI, mu * omega * omega / EI);
@@ -103,7 +103,7 @@ impl Stiffness {
     /// Computes the height and the shortening of the end, over the length, under a force (N) of
     /// constant direction, for any deflection, without stretch or shear. Integrates the elastica
     /// `EI theta'' = -F cos theta` by RK4, with bisection on the curvature at the clamp.
-    pub fn elastica(&self, force: f64) -> [f64; 2] {
+    pub(crate) fn elastica(&self, force: f64) -> [f64; 2] {
         let load = force * self.l.powi(2) / self.EI_y;
         let end = |curvature: f64| -> [f64; 4] {
             const STEPS: usize = 2000;
@@ -128,7 +128,7 @@ impl Stiffness {
 
 /// Torsion constant (m⁴) of a rectangle: St. Venant's series, Timoshenko & Goodier, Theory of
 /// Elasticity, article 109.
-pub fn rectangle_torsion(long: f64, short: f64) -> f64 {
+pub(crate) fn rectangle_torsion(long: f64, short: f64) -> f64 {
     use std::f64::consts::PI;
     let term = |n: f64| (n * PI * long / (2.0 * short)).tanh() / n.powi(5);
     let series: f64 = (0..200).map(|k| term(f64::from(2 * k + 1))).sum();
@@ -147,14 +147,14 @@ fn bisect(f: impl Fn(f64) -> f64, mut low: f64, mut high: f64) -> f64 {
 
 /// Moves the reference point of a compliance over a rigid lever: `Ad C Adᵀ`, from B to T with
 /// `p_BT` (same axes).
-pub fn at_lever(C: &Matrix6<f64>, p_BT: &Vector3<f64>) -> Matrix6<f64> {
+pub(crate) fn at_lever(C: &Matrix6<f64>, p_BT: &Vector3<f64>) -> Matrix6<f64> {
     let mut Ad = Matrix6::identity();
     Ad.fixed_view_mut::<3, 3>(0, 3).copy_from(&-p_BT.cross_matrix());
     Ad * C * Ad.transpose()
 }
 
 /// Rotates a compliance to other axes: `R C Rᵀ`, with `R` on both halves.
-pub fn turned(C: &Matrix6<f64>, R: &Matrix3<f64>) -> Matrix6<f64> {
+pub(crate) fn turned(C: &Matrix6<f64>, R: &Matrix3<f64>) -> Matrix6<f64> {
     let mut B = Matrix6::zeros();
     B.fixed_view_mut::<3, 3>(0, 0).copy_from(R);
     B.fixed_view_mut::<3, 3>(3, 3).copy_from(R);

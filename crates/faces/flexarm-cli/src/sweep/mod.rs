@@ -1,4 +1,7 @@
 //! `flexarm sweep`: studies of many runs, their shards, and their results.
+//!
+//! [`run`] chooses between a study, `merge` of its shards, and `plan` (`plan.rs`). Not here:
+//! samples, indices and files of a study (`flexarm::sweep`).
 
 pub(crate) mod plan;
 

@@ -1,4 +1,7 @@
-//! The interface of `include/flexarm.h`.
+//! The interface of `include/flexarm.h`: open a robot, find variables, start, step, read.
+//!
+//! A function returns 0, or -1 after keeping its message for `flexarm_error` of the same thread.
+//! Not here: rules of pointers (`mod.rs`), what the functions do ([`FmuModel`]).
 
 use std::cell::RefCell;
 use std::ffi::{CString, c_char, c_int};

@@ -1,4 +1,7 @@
-//! FMI 2.0, co-simulation and model exchange.
+//! FMI 2.0, co-simulation and model exchange: the functions that an importer calls by name.
+//!
+//! Each passes its arguments to [`Instance`]; what has no meaning for this FMU (integers, strings,
+//! input derivatives) returns an error. Not here: rules of pointers (`mod.rs`).
 
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
 use std::path::PathBuf;

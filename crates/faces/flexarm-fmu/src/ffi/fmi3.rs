@@ -1,4 +1,7 @@
-//! FMI 3.0, co-simulation and model exchange.
+//! FMI 3.0, co-simulation and model exchange: the functions that an importer calls by name.
+//!
+//! Each passes its arguments to [`Instance`]; what has no meaning for this FMU (clocks, strings,
+//! integers, events) returns an error or nothing. Not here: rules of pointers (`mod.rs`).
 
 use std::ffi::{c_char, c_int, c_void};
 use std::path::Path;

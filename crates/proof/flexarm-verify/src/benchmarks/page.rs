@@ -1,4 +1,6 @@
-//! The page of the case.
+//! The page of the case: two-link arms, slider crank, blade.
+//!
+//! Not here: numbers (the files of their names).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 

@@ -1,4 +1,7 @@
 //! Simeon's slider crank, a closed loop with a flexible rod, against a geometrically exact beam.
+//!
+//! Motion in a plane; the deflection is the distance of the middle of the rod from the line between
+//! its ends (m). Truths: an exact and a linear beam, stored in `tests/benchmarks/slider_crank`.
 
 use flexarm::{LoadOptions, RobotSource};
 use nalgebra::Vector2;

@@ -1,4 +1,6 @@
-//! The page of the case.
+//! The page of the case: loads at the flange, weight, frequencies, ties.
+//!
+//! Not here: numbers (`study.rs`, `truth.rs`).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 

@@ -1,4 +1,7 @@
 //! Loads, weight, frequencies and ties of the casting.
+//!
+//! Six-vectors are those of interface B with A held, axes of the link, z from A towards B. Not
+//! here: results of the mesh and of other programs (`truth.rs`).
 
 use flexarm::{Modelling, Robot};
 use flexarm_fem::reduction::Tie;

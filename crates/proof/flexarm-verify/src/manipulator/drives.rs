@@ -1,4 +1,6 @@
 //! Elastic links, elastic drives, and both; then every method again with elastic drives.
+//!
+//! Not here: models and steppers with links alone (`methods.rs`).
 
 use flexarm::steppers::ConstraintForm;
 use flexarm::{DriveModel, LinkModel, Modelling, StepperKind};

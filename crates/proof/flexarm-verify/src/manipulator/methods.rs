@@ -1,4 +1,7 @@
 //! One motion, every model and stepper.
+//!
+//! Errors are largest distances from the reference run, over its peak. Not here: the runs
+//! (`runs.rs`).
 
 use flexarm::steppers::{ConstraintForm, ReferenceSettings, SpookPreset, SpookSettings};
 use flexarm::{LinkModel, Modelling, Motion, Robot, StepperKind};

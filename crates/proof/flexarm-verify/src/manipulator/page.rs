@@ -1,4 +1,6 @@
-//! The page of the case.
+//! The page of the case, first half: one motion by every model and stepper; a pick.
+//!
+//! Not here: numbers (`methods.rs`, `pick.rs`), drives (`drives_page.rs`).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 

@@ -1,4 +1,8 @@
 //! Runs of the manipulator, and the results kept of each.
+//!
+//! A [`Run`] keeps TCP and deflection over time (m, world axes) and the figures that a page prints;
+//! [`Runs`] makes them and reports progress. Not here: which runs are compared (`methods.rs`,
+//! `drives.rs`).
 
 use std::ops::ControlFlow;
 

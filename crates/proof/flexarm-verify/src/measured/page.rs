@@ -1,4 +1,6 @@
-//! The page of the case.
+//! The page of the case: torques, gears, servos, frequencies.
+//!
+//! Not here: numbers (the other files of the folder).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 

@@ -1,4 +1,7 @@
 //! The three recorded runs, smoothed for the comparison.
+//!
+//! Positions in rad, velocities and accelerations by differentiation of the smoothed positions,
+//! torques in N m.
 
 use flexarm::Robot;
 use flexarm_fe_io::unpack_gzip;

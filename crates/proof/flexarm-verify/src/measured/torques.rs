@@ -1,4 +1,6 @@
 //! Inverse dynamics along the recorded motor positions compared with the recorded torques.
+//!
+//! Torques at the joints (N m). Not here: smoothing of the recordings (`recording.rs`).
 
 use flexarm::Robot;
 use flexarm_kinematics::{Data, Model, State, inverse_dynamics};

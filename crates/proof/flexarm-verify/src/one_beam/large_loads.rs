@@ -1,4 +1,7 @@
 //! Loads large enough for geometric nonlinearity: the limit of linear elasticity.
+//!
+//! Truths: the elastica for the bar of beam theory, nonlinear finite elements of CalculiX for the
+//! one from the mesh. Not here: small loads (`study.rs`).
 
 use flexarm::{Modelling, Robot};
 use nalgebra::{Matrix6, Vector6};

@@ -1,4 +1,7 @@
 //! The bar as a mesh: flexarm's finite elements, CalculiX, beam theory, and the reduced link.
+//!
+//! The bar lies along x from A to B; compliances at B, or at sections, with A held (m, rad per N, N
+//! m). Not here: the bar of beam theory (`study.rs`).
 
 use flexarm::Robot;
 use flexarm_fem::UnitSystem;

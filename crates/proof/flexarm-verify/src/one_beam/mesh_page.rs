@@ -1,4 +1,6 @@
 //! The page of the case, second half: the bar as a mesh.
+//!
+//! Not here: numbers (`mesh.rs`).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 

@@ -1,4 +1,7 @@
 //! The bar in motion: error as a function of the step size, and a spin-up.
+//!
+//! [`Steps`] compares steppers at several step sizes with the one with error control, [`SpinUp`] compares
+//! link models with a chain of many parts. World axes, m. Not here: statics (`study.rs`).
 
 use std::sync::Arc;
 

@@ -1,4 +1,7 @@
-//! The page of the case.
+//! The page of the case, first half: closed forms, large loads, motion.
+//!
+//! Bounds of the claims stand here, beside the sentence that they are for. Not here: numbers
+//! (`study.rs`, `motion.rs`, `large_loads.rs`), the mesh (`mesh_page.rs`).
 
 use flexarm::steppers::ConstraintForm;
 use flexarm_draw::{CurveLook, Panel, PlotCurve};

@@ -1,4 +1,8 @@
 //! Loads, gravity and frequencies of the bar by every method, compared with closed forms.
+//!
+//! The bar lies along x, clamped at x = 0; world axes, SI units. [`Stations`] loads sections along
+//! it, [`Splits`] moves the joint of two parts, [`Weight`] counts parts and modes. Not here: closed
+//! forms (`bar.rs`, `textbook`).
 
 use flexarm::Robot;
 use nalgebra::{Matrix6, Vector3, Vector6};

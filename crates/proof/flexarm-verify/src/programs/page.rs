@@ -1,4 +1,6 @@
-//! The page of the case.
+//! The page of the case: accuracy and cost of programs, and today's build.
+//!
+//! Not here: numbers (`stored.rs`, `today.rs`).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 

@@ -1,4 +1,7 @@
 //! Stored results of the other programs: accuracy and cost.
+//!
+//! Read from `tests/verification/other_programs.json`, with program, version and script. Not here:
+//! this build (`today.rs`).
 
 use serde_json::Value;
 

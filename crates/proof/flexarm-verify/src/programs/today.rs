@@ -1,4 +1,7 @@
 //! Results of this build on this machine.
+//!
+//! Errors are distances of the TCP from the stored truth, over its peak; times are not judged,
+//! since machines differ. Not here: the other programs (`stored.rs`).
 
 use std::path::Path;
 

@@ -1,4 +1,7 @@
-//! The page of the case.
+//! The page of the case: loads at the tip, meshes, sections, ring-down, whirl.
+//!
+//! Bounds of the claims stand here, beside the sentence that they are for. Not here: numbers (the
+//! other files of the folder).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve};
 

@@ -1,4 +1,6 @@
 //! Ring-down under gravity: error of the stepper and error of the model.
+//!
+//! Not here: steady ringing during rotation (`whirl.rs`).
 
 use flexarm::{Robot, StepperKind};
 use flexarm_stepping::{Damping, ReferenceSettings};

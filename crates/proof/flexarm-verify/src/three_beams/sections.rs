@@ -1,4 +1,7 @@
 //! Differences between the sections of beam theory and the meshes, beam by beam.
+//!
+//! The middle layers of a mesh show the section alone, its end also shows the ties. Compliances at
+//! the end, axes of the beam (m, rad per N, N m). Not here: the whole arm (`study.rs`).
 
 use flexarm::Robot;
 use flexarm_fem::UnitSystem;
