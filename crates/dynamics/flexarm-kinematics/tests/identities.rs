@@ -584,3 +584,61 @@ fn a_vector_of_another_length_than_the_tree_is_refused_with_both_lengths() {
         });
     }
 }
+
+/// Data of another model gave numbers of the wrong tree, or ended in an index out of bounds.
+#[test]
+fn data_and_roles_of_another_tree_are_refused_with_both_sizes() {
+    let Case { model, mut data, state, qddot, .. } = case(3, 4);
+    let other = case(5, 3);
+    let (bodies, nv) = (other.model.bodies().len(), other.model.nv());
+    assert_ne!((bodies, nv), (model.bodies().len(), model.nv()));
+    let (roles, others) = (Roles::all_free(&model), Roles::all_free(&other.model));
+    let refused = |expected: &str, call: &mut dyn FnMut()| {
+        let caught = std::panic::catch_unwind(std::panic::AssertUnwindSafe(call));
+        let panic = caught.expect_err(expected);
+        let text = panic.downcast_ref::<String>().unwrap();
+        assert!(text.contains(expected), "{text}");
+    };
+    let mut wrong = other.data;
+    let sizes = format!("data has {bodies} bodies and {nv} coordinates");
+    let mut with_wrong_data = |call: &dyn Fn(&mut Data)| refused(&sizes, &mut || call(&mut wrong));
+    with_wrong_data(&|data| forward_kinematics(&model, data, &state.q));
+    with_wrong_data(&|data| forward_kinematics_velocity(&model, data, &state));
+    with_wrong_data(&|data| drop(inverse_dynamics(&model, data, &state, &qddot).clone()));
+    with_wrong_data(&|data| drop(nonlinear_effects(&model, data, &state).clone()));
+    with_wrong_data(&|data| drop(gravity_forces(&model, data, &state.q).clone()));
+    with_wrong_data(&|data| drop(gravity_forces_at_poses(&model, data, &state.q).clone()));
+    with_wrong_data(&|data| drop(mass_matrix(&model, data, &state.q).clone()));
+    with_wrong_data(&|data| drop(forward_dynamics(&model, data, &state, &roles, &qddot).clone()));
+    refused(&format!("roles are those of a model of {bodies} bodies"), &mut || {
+        drop(forward_dynamics(&model, &mut data, &state, &others, &qddot).clone());
+    });
+}
+
+/// Truth: the coordinate of `S q` is q for every type of joint, whatever its axis and pitch; a twist
+/// and its power on a wrench are those of the column S.
+#[test]
+fn a_joint_axis_and_its_column_describe_one_motion() {
+    let axis = Vector3::new(2.0, -1.0, 2.0) / 3.0;
+    let motions = [
+        AxisMotion::Revolute(axis),
+        AxisMotion::Prismatic(axis),
+        AxisMotion::Helical { axis, pitch: 0.3 },
+        AxisMotion::Helical { axis, pitch: -4.0 },
+    ];
+    let F = Wrench::new(Vector3::new(3.0, -5.0, 7.0), Vector3::new(-2.0, 11.0, 4.0));
+    for motion in motions {
+        let S = motion.column();
+        for q in [-1.3, 0.0, 2.7] {
+            assert!((motion.coordinate_of(&(S * q)) - q).abs() < 1e-14, "{motion:?}"); // measured 4.4e-16
+            assert!((motion.twist(q).to_vector() - S * q).amax() < 1e-14, "{motion:?}"); // measured 0
+        }
+        assert!((motion.project(&F) - S.dot(&F.to_vector())).abs() < 1e-13, "{motion:?}"); // measured 3.6e-15
+        // A small motion along the pose is the column, to second order.
+        let (h, X) = (1e-5, motion.pose(1e-5));
+        let d = X.translation.vector;
+        let r = rotation_vector(X.rotation.matrix());
+        let moved = nalgebra::Vector6::new(d.x, d.y, d.z, r.x, r.y, r.z) / h;
+        assert!((moved - S).amax() < 1e-9, "{motion:?}"); // measured 6e-12
+    }
+}

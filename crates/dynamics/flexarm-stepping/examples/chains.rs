@@ -49,7 +49,7 @@ fn main() {
         for _ in 0..5 {
             let start = ThreadTime::now();
             let plant = plant(joints);
-            coordinates = plant.n_elastic_coordinates();
+            coordinates = plant.model.n_elastic();
             let alpha = StepperKind::GeneralizedAlpha(AlphaSettings::default());
             let mut stepper = new_stepper(alpha, plant, 1e-3, Start::Equilibrium).unwrap();
             set_up = set_up.min(start.elapsed().as_secs_f64());

@@ -172,7 +172,7 @@ impl Plant {
     /// # Errors
     /// As [`Plant::new`].
     pub fn update_modes_and_damping(&mut self) -> Result<(), StepError> {
-        let n = self.n_elastic_coordinates();
+        let n = self.model.n_elastic();
         if n == 0 || self.at_rest {
             return Ok(());
         }
@@ -225,7 +225,7 @@ impl Plant {
     /// Returns the mass matrix of the elastic coordinates at the pose at which the modes are
     /// computed.
     fn mass_at_start(&self) -> DMatrix<f64> {
-        let (model, n) = (&self.model, self.n_elastic_coordinates());
+        let (model, n) = (&self.model, self.model.n_elastic());
         let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
         self.prescribed_state(0.0, &mut state, &mut qddot);
         state.q.rows_mut(model.n_actuated(), n).copy_from(&self.modes.equilibrium);

@@ -61,7 +61,7 @@ impl ExactRun {
         plant.carry_from_start()?;
         let e = match self.start {
             Start::Equilibrium => static_equilibrium(&plant, 0.0)?,
-            Start::Undeformed => DVector::zeros(plant.n_elastic_coordinates()),
+            Start::Undeformed => DVector::zeros(plant.model.n_elastic()),
         };
         let plant = Arc::new(plant);
         let mut stepper = settings.stepper(plant.clone(), step_s, &e)?;

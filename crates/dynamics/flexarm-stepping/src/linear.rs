@@ -307,7 +307,7 @@ impl Tangents {
     pub fn at(plant: &Plant, tool: &Frame, F_T_W: &Wrench, q: &DVector<f64>) -> Self {
         plant.model.check_size("q", q.len());
         let model = &plant.model;
-        let (m, n) = (model.n_actuated(), plant.n_elastic_coordinates());
+        let (m, n) = (model.n_actuated(), plant.model.n_elastic());
         let mut data = Data::new(model);
         let statics = Statics { plant, tool, F_T_W: *F_T_W, t: 0.0 };
         let e = q.rows(m, n).into_owned();

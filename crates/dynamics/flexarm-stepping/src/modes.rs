@@ -16,7 +16,7 @@ use crate::statics::{for_vibration, static_equilibrium, tangent_stiffness};
 /// # Errors
 /// [`StepError::NoEquilibrium`] or [`StepError::Singular`].
 pub(crate) fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
-    let n = plant.n_elastic_coordinates();
+    let n = plant.model.n_elastic();
     if n == 0 {
         return Ok(Modes::default());
     }

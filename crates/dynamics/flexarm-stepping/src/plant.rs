@@ -250,11 +250,6 @@ impl Plant {
         Self { motion, ..self.clone() }
     }
 
-    /// Returns the number of elastic coordinates.
-    pub fn n_elastic_coordinates(&self) -> usize {
-        self.model.n_elastic()
-    }
-
     /// Returns the number of free coordinates: joints driven by torque, then elastic ones.
     pub fn n_free(&self) -> usize {
         self.torque_driven.len() + self.model.n_elastic()
@@ -263,7 +258,7 @@ impl Plant {
     /// Returns the stiffness on the elastic coordinates: blocks of the elements plus cross
     /// stiffness of coupled gears. Nonlinear springs contribute their `K`.
     pub fn stiffness(&self) -> DMatrix<f64> {
-        let n = self.n_elastic_coordinates();
+        let n = self.model.n_elastic();
         let mut K = DMatrix::zeros(n, n);
         for element in &self.elements {
             let k = self.offset(element);

@@ -52,7 +52,7 @@ impl StaticPath {
     /// Creates the path of an arm with its loads and changes of inertia.
     pub fn new(plant: impl Into<Arc<Plant>>) -> Self {
         let plant = plant.into();
-        let (nv, n) = (plant.model.nv(), plant.n_elastic_coordinates());
+        let (nv, n) = (plant.model.nv(), plant.model.n_elastic());
         Self {
             events: EventQueue::of_changes(&plant),
             data: Data::new(&plant.model),

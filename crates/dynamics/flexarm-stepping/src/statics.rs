@@ -24,7 +24,7 @@ use crate::plant::Plant;
 /// # Errors
 /// [`StepError::NoEquilibrium`], [`StepError::Singular`] or [`StepError::OpenLoop`].
 pub fn static_equilibrium(plant: &Plant, t: f64) -> Result<DVector<f64>, StepError> {
-    let n = plant.n_elastic_coordinates();
+    let n = plant.model.n_elastic();
     // Start from the equilibrium computed with the modes, which is the solution if nothing has
     // changed since; with nonlinear springs (backlash) start undeformed.
     let straight = plant.elements.iter().all(|element| element.curve.is_none());

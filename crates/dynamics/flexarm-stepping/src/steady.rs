@@ -88,10 +88,7 @@ impl Rotation {
             qdot.copy_from_slice(&rates);
             qddot.fill(0.0);
         });
-        Self {
-            system: ReducedArm::new(plant.along(Arc::new(motion))),
-            zero: DVector::zeros(plant.n_elastic_coordinates()),
-        }
+        Self { system: ReducedArm::new(plant.along(Arc::new(motion))), zero: DVector::zeros(plant.model.n_elastic()) }
     }
 
     /// Returns the forces on the elastic coordinates at time t (s), without accelerations.

@@ -383,7 +383,7 @@ fn work_of_the_drives_is_stored_or_dissipated() {
         for step in 0..=steps {
             stepper.observe(&mut seen);
             let drive = seen.drive.dot(&seen.qdot.rows(0, n));
-            let rates = seen.qdot.rows(n, plant.n_elastic_coordinates()).clone_owned();
+            let rates = seen.qdot.rows(n, plant.model.n_elastic()).clone_owned();
             powers.push(drive - rates.dot(&(&plant.D * &rates)));
             energies.push(seen.energy.iter().sum::<f64>());
             if step < steps {

@@ -98,7 +98,7 @@ fn main() {
         assert!(static_equilibrium(&plant, 0.0).is_ok());
         println!(
             "| {name} | {} | {:.5} | {:.3} | {} | {:.2} | {:.2} |",
-            plant.n_elastic_coordinates(),
+            plant.model.n_elastic(),
             1e3 * sag,
             100.0 * error,
             f.join(" "),

@@ -83,7 +83,7 @@ impl Layout {
         tool: Option<&CuttingTool>,
         matrix: bool,
     ) -> Self {
-        let elastic = plant.n_elastic_coordinates();
+        let elastic = plant.model.n_elastic();
         let frequencies = frequencies.min(elastic).min(MAX_FREQUENCIES);
         // Place and pose.
         let mut columns: Vec<MapColumn> = HEAD.iter().map(|(name, meaning)| place(name, meaning)).collect();

@@ -56,10 +56,10 @@ pub(crate) fn assemble(model: &mut Model, mechanism: &Mechanism) -> Result<(), M
         for &i in loop_.chains.iter().flatten() {
             joint_position(model, &mut data, i, &q);
         }
-        loop_.place_chains(model, &data, &mut solved.X);
-        check_plane(&loop_, closure, model, &solved.X)?;
-        let triangle = loop_.triangle(model, &solved.X);
-        let size = loop_.gap(&solved.X).1;
+        loop_.place_chains(model, &data, &mut solved.X_C);
+        check_plane(&loop_, closure, model, &solved.X_C)?;
+        let triangle = loop_.triangle(model, &solved.X_C);
+        let size = loop_.gap(&solved.X_C).1;
         // Size of a displacement, with rotations weighted by the size of the loop.
         let far = |turn: &[f64; 2]| {
             let length = |d: usize| if triangle.joints[d].slides { 1.0 } else { size };
@@ -69,7 +69,7 @@ pub(crate) fn assemble(model: &mut Model, mechanism: &Mechanism) -> Result<(), M
         let found = [1.0, -1.0].map(|root| triangle.solve(root).map(|turn| (root, turn)));
         let nearest = found.into_iter().flatten().min_by(|a, b| far(&a.1).total_cmp(&far(&b.1)));
         let Some((root, turn)) = nearest else {
-            let gap = loop_.gap(&solved.X).0.norm();
+            let gap = loop_.gap(&solved.X_C).0.norm();
             let what = format!(
                 "it does not close where its driving joints are at the start: pin and eye are {gap:.6} m apart there and no \
                  values of {:?} and {:?} bring them together; check the two points, or give values in at at which it is assembled",
@@ -109,16 +109,16 @@ fn start_values(model: &Model, closure: &LoopClosure) -> Result<Vec<f64>, ModelE
 }
 
 /// Checks that revolute axes are parallel and sliding axes perpendicular to the pin axis.
-fn check_plane(loop_: &PlacedLoop, closure: &LoopClosure, model: &Model, X: &[Pose]) -> Result<(), ModelError> {
-    let (A, _) = loop_.ends_at(X);
-    let normal: Vector3<f64> = A.rotation * Vector3::z();
+fn check_plane(loop_: &PlacedLoop, closure: &LoopClosure, model: &Model, X_C: &[Pose]) -> Result<(), ModelError> {
+    let (X_CA, _) = loop_.ends_at(X_C);
+    let normal: Vector3<f64> = X_CA.rotation * Vector3::z();
     for &i in loop_.chains.iter().flatten() {
         let body = &model.bodies[i];
         let JointMotion::Axis(motion) = body.motion else { continue };
         if body.elastic {
             continue;
         }
-        let axis = X[i].rotation * motion.axis();
+        let axis = X_C[i].rotation * motion.axis();
         let (off, expected) = match motion {
             AxisMotion::Prismatic(_) => (axis.dot(&normal).abs().min(1.0).asin(), "slide across it"),
             AxisMotion::Revolute(_) => (axis.cross(&normal).norm().min(1.0).asin(), "turn about axes along it"),

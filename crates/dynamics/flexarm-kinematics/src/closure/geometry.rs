@@ -1,7 +1,8 @@
 //! Geometry of a loop at given joint poses: its gap, Jacobian, triangle and transmission angle.
 //!
-//! `X_C[i]` is the pose of body i in the common body C of the loop; vectors are in axes of C, but
-//! two-vectors in the plane of the pin A.
+//! `X_C[i]` is the pose of body i in the common body C of the loop, `X_CA` that of the pin A (its axis is
+//! z), `p_CB` the position of the eye. Vectors are in axes of C, but two-vectors in the plane of A. Not
+//! here: the solution of (1) (`positions`).
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -23,7 +24,7 @@ impl PlacedLoop {
         }
     }
 
-    /// Pose of the pin and position of the eye in the common body.
+    /// `X_CA` and `p_CB`: pose of the pin and position of the eye in the common body.
     pub(super) fn ends_at(&self, X_C: &[Pose]) -> (Pose, Vector3<f64>) {
         let eye = &X_C[self.ends[1]];
         (X_C[self.ends[0]] * self.X_pin, eye.rotation * self.p_eye + eye.translation.vector)
@@ -31,43 +32,42 @@ impl PlacedLoop {
 
     /// Residual of (1) (m), and the size of the loop (m).
     pub(super) fn gap(&self, X_C: &[Pose]) -> (Vector2<f64>, f64) {
-        let (A, p_B) = self.ends_at(X_C);
-        let p = A.rotation.inverse() * (p_B - A.translation.vector);
+        let (X_CA, p_CB) = self.ends_at(X_C);
+        let p = X_CA.rotation.inverse() * (p_CB - X_CA.translation.vector);
         let size = self.chains.iter().flatten().map(|&i| X_C[i].translation.vector.amax());
-        (p.xy(), size.chain([p_B.amax(), A.translation.vector.amax()]).fold(0.0, f64::max))
+        (p.xy(), size.chain([p_CB.amax(), X_CA.translation.vector.amax()]).fold(0.0, f64::max))
     }
 
     /// `∂c/∂q`, two rows per coordinate of the tree; zero for coordinates that do not move the
     /// loop.
     pub(super) fn jacobian(&self, model: &Model, data: &Data, X_C: &[Pose], J: &mut [Vector2<f64>]) {
         J.fill(Vector2::zeros());
-        let (A, p_B) = self.ends_at(X_C);
-        let R_A = A.rotation.inverse();
+        let (X_CA, p_CB) = self.ends_at(X_C);
+        let R_AC = X_CA.rotation.inverse();
         for (chain, sign) in self.chains.iter().zip([-1.0, 1.0]) {
             for &i in chain {
-                let r = p_B - X_C[i].translation.vector;
+                let r = p_CB - X_C[i].translation.vector;
                 joint_columns(model, data, i, X_C[i].rotation.matrix(), |k, l, a| {
-                    J[k] += (R_A * (l + a.cross(&r))).xy() * sign;
+                    J[k] += (R_AC * (l + a.cross(&r))).xy() * sign;
                 });
             }
         }
     }
 
-    /// The loop as a triangle in the plane normal to the pin, at the joint poses in `X`.
+    /// The loop as a triangle in the plane normal to the pin, at the joint poses in `X_C`.
     pub(super) fn triangle(&self, model: &Model, X_C: &[Pose]) -> Triangle {
-        let (A, p_B) = self.ends_at(X_C);
-        let R = A.rotation.inverse();
-        let flat = |p: &Vector3<f64>| (R * (p - A.translation.vector)).xy();
+        let (X_CA, p_CB) = self.ends_at(X_C);
+        let R_AC = X_CA.rotation.inverse();
+        let flat = |p: &Vector3<f64>| (R_AC * (p - X_CA.translation.vector)).xy();
         let joint = |which: usize| {
             let body = self.dependent[which];
             let axis = model.bodies[body].motion_axis();
-            let axis_A = R * (X_C[body].rotation * axis);
+            let axis_A = R_AC * (X_C[body].rotation * axis);
             let slides = model.bodies[body].slides();
             let way = if slides { axis_A.xy() } else { Vector2::new(axis_A.z.signum(), 0.0) };
             FlatJoint { slides, at: flat(&X_C[body].translation.vector), way }
         };
-        let (p_A, p_B) = (Vector2::zeros(), flat(&p_B));
-        Triangle { joints: [joint(0), joint(1)], ends: [p_A, p_B], shape: self.shape }
+        Triangle { joints: [joint(0), joint(1)], ends: [Vector2::zeros(), flat(&p_CB)], shape: self.shape }
     }
 
     /// Transmission angle (rad), 90 degrees at best: the angle between the two triangle sides

@@ -1,4 +1,4 @@
-//! Loop on the bodies of the tree.
+//! Loop on the bodies of the tree: indices of bodies and coordinates, and the frames of pin and eye.
 
 use flexarm_spatial::Pose;
 use nalgebra::Vector3;

@@ -39,8 +39,8 @@ impl Solved {
     fn close(&mut self, model: &Model, data: &mut Data, q: &mut [f64], k: usize) {
         let loop_ = &model.loops[k];
         // Closed form.
-        loop_.place_chains(model, data, &mut self.X);
-        let start = loop_.triangle(model, &self.X).solve(loop_.root);
+        loop_.place_chains(model, data, &mut self.X_C);
+        let start = loop_.triangle(model, &self.X_C).solve(loop_.root);
         let mut x = match start {
             Some(turn) => [loop_.start[0] + turn[0], loop_.start[1] + turn[1]],
             None => [f64::NAN; 2],
@@ -54,9 +54,9 @@ impl Solved {
                     data.X_PB[body] = own.X_PJ * motion.pose(x);
                 }
             }
-            loop_.place_chains(model, data, &mut self.X);
-            let (c, size) = loop_.gap(&self.X);
-            loop_.jacobian(model, data, &self.X, &mut self.J[k]);
+            loop_.place_chains(model, data, &mut self.X_C);
+            let (c, size) = loop_.gap(&self.X_C);
+            loop_.jacobian(model, data, &self.X_C, &mut self.J[k]);
             let J_d = Matrix2::from_columns(&[self.J[k][loop_.first], self.J[k][loop_.first + 1]]);
             self.inverse[k] = J_d.try_inverse().unwrap_or_else(|| Matrix2::from_element(f64::NAN));
             let gap = c.norm();
@@ -68,14 +68,14 @@ impl Solved {
             let step = self.inverse[k] * c;
             x = [x[0] - step.x, x[1] - step.y];
         }
-        let (c, size) = loop_.gap(&self.X);
+        let (c, size) = loop_.gap(&self.X_C);
         let closed = c.norm() <= 1e-9 * size && self.inverse[k].iter().all(|x| x.is_finite());
         if !closed {
             x = [f64::NAN; 2];
             self.open = self.open.or(Some(k));
         }
         q[loop_.first..loop_.first + 2].copy_from_slice(&x);
-        self.angle[k] = loop_.transmission(model, &self.X, &self.J[k]);
+        self.angle[k] = loop_.transmission(model, &self.X_C, &self.J[k]);
         self.slopes(loop_, k);
     }
 

@@ -17,7 +17,7 @@ impl Solved {
     pub(super) fn rates(&self, model: &Model, data: &Data, q: &[f64], qdot: &[f64], to: &mut LoopRates, with_T: bool) {
         let nv = self.nv;
         for (k, loop_) in model.loops.iter().enumerate() {
-            loop_.place_chains(model, data, &mut to.X);
+            loop_.place_chains(model, data, &mut to.X_C);
             loop_.move_chains(model, data, q, qdot, None, to);
             let (J, Jdot) = (&self.J[k], &to.Jdot);
             let minus = -self.inverse[k];
@@ -51,7 +51,7 @@ impl Solved {
     ) {
         qdot.fill(0.0);
         for (k, loop_) in model.loops.iter().enumerate() {
-            loop_.place_chains(model, data, &mut to.X);
+            loop_.place_chains(model, data, &mut to.X_C);
             let common = moved.at_child(&data.X_WB[loop_.common]);
             loop_.move_chains(model, data, q, qdot, Some((body, &common)), to);
             let rate = self.inverse[k] * loop_.gap_rate(to);
@@ -96,37 +96,37 @@ impl PlacedLoop {
         moved: Option<(usize, &Twist)>,
         to: &mut LoopRates,
     ) {
-        let LoopRates { X, v, w, Jdot, .. } = to;
+        let LoopRates { X_C, v, w, Jdot, .. } = to;
         (v[self.common], w[self.common]) = (Vector3::zeros(), Vector3::zeros());
         // Velocities of the bodies, from the common body outward.
         for &i in self.chains.iter().flatten() {
             let parent = model.bodies[i].parent;
-            let arm = X[i].translation.vector - X[parent].translation.vector;
+            let arm = X_C[i].translation.vector - X_C[parent].translation.vector;
             let (mut v_i, mut w_i) = (v[parent] + w[parent].cross(&arm), w[parent]);
-            joint_columns(model, data, i, X[i].rotation.matrix(), |k, l, a| {
+            joint_columns(model, data, i, X_C[i].rotation.matrix(), |k, l, a| {
                 v_i += l * qdot[k];
                 w_i += a * qdot[k];
             });
             if let Some((_, twist)) = moved.filter(|(body, _)| *body == i) {
-                v_i += twist.linear + twist.angular.cross(&X[i].translation.vector);
+                v_i += twist.linear + twist.angular.cross(&X_C[i].translation.vector);
                 w_i += twist.angular;
             }
             (v[i], w[i]) = (v_i, w_i);
         }
         // Columns of J̇ in A axes: d/dt (l + a × r) - w_A × (l + a × r).
-        let (A, p_B) = self.ends_at(X);
+        let (X_CA, p_CB) = self.ends_at(X_C);
         let [a, b] = self.ends;
-        let v_B = v[b] + w[b].cross(&(p_B - X[b].translation.vector));
-        let (R_A, w_A) = (A.rotation.inverse(), w[a]);
+        let v_B = v[b] + w[b].cross(&(p_CB - X_C[b].translation.vector));
+        let (R_AC, w_A) = (X_CA.rotation.inverse(), w[a]);
         Jdot.fill(Vector2::zeros());
         for (chain, sign) in self.chains.iter().zip([-1.0, 1.0]) {
             for &i in chain {
-                let (r, rdot) = (p_B - X[i].translation.vector, v_B - v[i]);
-                let R = X[i].rotation.matrix();
+                let (r, rdot) = (p_CB - X_C[i].translation.vector, v_B - v[i]);
+                let R = X_C[i].rotation.matrix();
                 joint_column_rates(model, data, i, R, &w[i], q, qdot, |k, [l, a, ldot, adot]| {
                     let column = l + a.cross(&r);
                     let rate = ldot + adot.cross(&r) + a.cross(&rdot) - w_A.cross(&column);
-                    Jdot[k] += (R_A * rate).xy() * sign;
+                    Jdot[k] += (R_AC * rate).xy() * sign;
                 });
             }
         }
@@ -134,9 +134,9 @@ impl PlacedLoop {
 
     /// Time derivative of (1) at the velocities of the last [`Self::move_chains`].
     fn gap_rate(&self, at: &LoopRates) -> Vector2<f64> {
-        let LoopRates { X, v, w, .. } = at;
-        let (A, p_B) = self.ends_at(X);
-        let [v_A, v_B] = self.ends.map(|i| v[i] + w[i].cross(&(p_B - X[i].translation.vector)));
-        (A.rotation.inverse() * (v_B - v_A)).xy()
+        let LoopRates { X_C, v, w, .. } = at;
+        let (X_CA, p_CB) = self.ends_at(X_C);
+        let [v_A, v_B] = self.ends.map(|i| v[i] + w[i].cross(&(p_CB - X_C[i].translation.vector)));
+        (X_CA.rotation.inverse() * (v_B - v_A)).xy()
     }
 }

@@ -51,13 +51,13 @@ impl LoopData {
             for &j in loop_.moved_by.iter().filter(|j| **j >= solved.nv) {
                 tau[j] -= solved.J[k][j].dot(&f);
             }
-            loop_.place_chains(model, data, &mut rates.X);
-            let (A, p_B) = loop_.ends_at(&rates.X);
-            let force = A.rotation * Vector3::new(f.x, f.y, 0.0);
+            loop_.place_chains(model, data, &mut rates.X_C);
+            let (X_CA, p_CB) = loop_.ends_at(&rates.X_C);
+            let force = X_CA.rotation * Vector3::new(f.x, f.y, 0.0);
             for (chain, sign) in loop_.chains.iter().zip([1.0, -1.0]) {
                 for &i in chain {
-                    let R = rates.X[i].rotation.inverse().matrix() * sign;
-                    let moment = (p_B - rates.X[i].translation.vector).cross(&force);
+                    let R = rates.X_C[i].rotation.inverse().matrix() * sign;
+                    let moment = (p_CB - rates.X_C[i].translation.vector).cross(&force);
                     data.F[i].force += R * force;
                     data.F[i].torque += R * moment;
                 }

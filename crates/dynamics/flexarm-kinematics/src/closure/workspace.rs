@@ -38,14 +38,15 @@ pub(super) struct Solved {
     pub(super) angle: Vec<f64>,
     /// First loop that cannot be closed.
     pub(super) open: Option<usize>,
-    /// Poses in the common body.
-    pub(super) X: Vec<Pose>,
+    /// Poses in the common body of the last loop.
+    pub(super) X_C: Vec<Pose>,
 }
 
 /// (3) and the time derivative of T in (2) at tree velocities.
 #[derive(Clone, Debug)]
 pub(super) struct LoopRates {
-    pub(super) X: Vec<Pose>,
+    /// Poses, and velocities and angular velocities of the origins, of the bodies of the last loop.
+    pub(super) X_C: Vec<Pose>,
     pub(super) v: Vec<Vector3<f64>>,
     pub(super) w: Vec<Vector3<f64>>,
     pub(super) Jdot: Vec<Vector2<f64>>,
@@ -58,7 +59,7 @@ impl LoopRates {
     pub(super) fn new(model: &Model) -> Self {
         let (n, nd) = (model.bodies.len(), model.dependent().len());
         Self {
-            X: vec![Pose::identity(); n],
+            X_C: vec![Pose::identity(); n],
             v: vec![Vector3::zeros(); n],
             w: vec![Vector3::zeros(); n],
             Jdot: vec![Vector2::zeros(); model.nv() + nd],
@@ -85,7 +86,7 @@ impl LoopData {
                 inverse: vec![Matrix2::zeros(); loops],
                 angle: vec![FRAC_PI_2; loops],
                 open: None,
-                X: vec![Pose::identity(); model.bodies.len()],
+                X_C: vec![Pose::identity(); model.bodies.len()],
             },
             rates: LoopRates::new(model),
             free: CholeskyWorkspace::default(),

@@ -40,7 +40,7 @@ impl Plant {
     /// If `q` is not nv long.
     pub fn springs_at_rest(&self, q: &DVector<f64>) -> (DVector<f64>, Vec<f64>) {
         self.model.check_size("q", q.len());
-        let e = q.rows(self.model.n_actuated(), self.n_elastic_coordinates()).into_owned();
+        let e = q.rows(self.model.n_actuated(), self.model.n_elastic()).into_owned();
         let F = spring_forces(self, q.as_slice(), &e);
         let energy = |(k, element): (usize, &ElasticElement)| {
             let first = self.offset(element);

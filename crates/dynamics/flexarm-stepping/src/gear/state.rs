@@ -33,7 +33,7 @@ pub(crate) struct GearState {
 impl GearState {
     /// Creates the state if the arm has gear laws.
     pub(crate) fn of(plant: &Plant) -> Option<Box<Self>> {
-        let (zeros, elements) = (DVector::zeros(plant.n_elastic_coordinates()), plant.elements.iter());
+        let (zeros, elements) = (DVector::zeros(plant.model.n_elastic()), plant.elements.iter());
         plant.has_gear_laws().then(|| {
             Box::new(Self {
                 q: vec![0.0; plant.model.n_actuated()],

@@ -22,7 +22,7 @@ use crate::statics::{add_wrench, load_at};
 
 /// Returns whether poses of an arm can be computed in lanes.
 pub(super) fn plain(plant: &Plant) -> bool {
-    plant.n_elastic_coordinates() > 0
+    plant.model.n_elastic() > 0
         && !plant.has_gear_laws()
         && plant.loads.is_empty()
         && plant.model.balancers().is_empty()
@@ -60,7 +60,7 @@ impl<T: Real> LanePoints<T> {
     /// stiffness is not positive definite.
     pub(super) fn new(point: &OperatingPoint) -> Option<Self> {
         let OperatingPoint { plant, tool, K, .. } = point;
-        let (model, n) = (&plant.model, plant.n_elastic_coordinates());
+        let (model, n) = (&plant.model, plant.model.n_elastic());
         // Loops are closed by an iteration whose length depends on the pose.
         if !model.loops().is_empty() {
             return None;

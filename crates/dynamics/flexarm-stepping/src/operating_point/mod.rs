@@ -88,7 +88,7 @@ impl OperatingPoint {
     ///
     /// * `tool`: a frame of the arm's model.
     pub fn new(plant: Plant, tool: Frame) -> Self {
-        let (n, nv) = (plant.n_elastic_coordinates(), plant.model.nv());
+        let (n, nv) = (plant.model.n_elastic(), plant.model.nv());
         let K = plant.stiffness();
         let mut rest = Factor::new(n);
         let stiff = n > 0 && rest.compute(K.as_slice()) == 1.0;

@@ -195,7 +195,7 @@ pub fn new_stepper(
     }
     let e = match start {
         Start::Equilibrium => static_equilibrium(&plant, 0.0)?,
-        Start::Undeformed => DVector::zeros(plant.n_elastic_coordinates()),
+        Start::Undeformed => DVector::zeros(plant.model.n_elastic()),
     };
     kind.method().start(plant, h, &e)
 }

@@ -157,7 +157,7 @@ const COARSE: f64 = 1e-3;
 /// are linear and completely represented in Newton's matrix, modes are damped.
 fn forgets_errors(plant: &Plant) -> bool {
     let straight = plant.elements.iter().all(|element| element.curve.is_none() && element.geometric.is_none());
-    let mut force = DVector::zeros(plant.n_elastic_coordinates());
+    let mut force = DVector::zeros(plant.model.n_elastic());
     let damped = plant.modes.omega.iter().zip(plant.modes.shapes.column_iter()).all(|(omega, shape)| {
         force.fill(0.0);
         plant.add_damping(shape.as_slice(), force.as_mut_slice());

@@ -151,7 +151,7 @@ impl Spook {
     /// inertia; [`StepError::ModalLinks`] for modal links.
     pub fn new(plant: Plant, h: f64, settings: SpookSettings, e: &DVector<f64>) -> Result<Self, StepError> {
         check_known(&plant)?;
-        let (found, expected) = (e.len(), plant.n_elastic_coordinates());
+        let (found, expected) = (e.len(), plant.model.n_elastic());
         if found != expected {
             return Err(StepError::Setup(format!("{found} elastic coordinates are given, the arm has {expected}")));
         }
@@ -441,7 +441,7 @@ impl Spook {
             let R = self.poses[i].rotation.matrix();
             let J = turn_symmetric(R, &body.J);
             let mass = Matrix3::from_diagonal_element(body.mass);
-            self.solver.M[i] = Symmetric { A: mass, B: Matrix3::zeros(), C: J };
+            self.solver.M[i] = Symmetric { vv: mass, vw: Matrix3::zeros(), ww: J };
             // Momentum M v + h f.
             let spin = mul(&J, &body.V.angular);
             let load = &self.loads[i];

@@ -33,15 +33,15 @@ use nalgebra::{Matrix3, Matrix6, Vector3, Vector6};
 
 use super::constraint::Rows;
 
-/// `[[A, B], [Bᵀ, C]]`, symmetric.
+/// `[[vv, vw], [vwᵀ, ww]]`, symmetric: blocks of linear (v) and angular (w) rows and columns.
 #[derive(Clone, Copy, Debug)]
 pub struct Symmetric {
-    /// Upper left block.
-    pub A: Matrix3<f64>,
-    /// Upper right block.
-    pub B: Matrix3<f64>,
-    /// Lower right block.
-    pub C: Matrix3<f64>,
+    /// Linear block.
+    pub vv: Matrix3<f64>,
+    /// Linear rows, angular columns.
+    pub vw: Matrix3<f64>,
+    /// Angular block.
+    pub ww: Matrix3<f64>,
 }
 
 /// `[[tv, tw], [0, rw]]`.
@@ -88,67 +88,68 @@ fn inverse(X: &Matrix3<f64>) -> Option<Matrix3<f64>> {
 
 impl Symmetric {
     pub(super) fn zeros() -> Self {
-        Self { A: Matrix3::zeros(), B: Matrix3::zeros(), C: Matrix3::zeros() }
+        Self { vv: Matrix3::zeros(), vw: Matrix3::zeros(), ww: Matrix3::zeros() }
     }
 
     /// Creates the blocks of a symmetric matrix, linear rows first, in its axes.
     pub fn new(X: &Matrix6<f64>) -> Self {
         let block = |i, j| X.fixed_view::<3, 3>(i, j).into_owned();
-        Self { A: block(0, 0), B: block(0, 3), C: block(3, 3) }
+        Self { vv: block(0, 0), vw: block(0, 3), ww: block(3, 3) }
     }
 
     pub(super) fn scaled(&self, s: f64) -> Self {
-        Self { A: self.A * s, B: self.B * s, C: self.C * s }
+        Self { vv: self.vv * s, vw: self.vw * s, ww: self.ww * s }
     }
 
     /// Returns `blkdiag(R, R) X blkdiag(R, R)ᵀ`: the matrix in the axes into which R turns.
     pub(super) fn turned(&self, R: &Matrix3<f64>) -> Self {
-        let B = mul3(&mul3(R, &self.B), &R.transpose());
-        Self { A: turn_symmetric(R, &self.A), B, C: turn_symmetric(R, &self.C) }
+        let vw = mul3(&mul3(R, &self.vw), &R.transpose());
+        Self { vv: turn_symmetric(R, &self.vv), vw, ww: turn_symmetric(R, &self.ww) }
     }
 
     #[inline]
     fn plus(&self, o: &Self) -> Self {
-        Self { A: self.A + o.A, B: self.B + o.B, C: self.C + o.C }
+        Self { vv: self.vv + o.vv, vw: self.vw + o.vw, ww: self.ww + o.ww }
     }
 
     #[inline]
     fn times(&self, v: &Vector6<f64>) -> Vector6<f64> {
         let (a, b) = halves(v);
-        joined(&(mul(&self.A, &a) + mul(&self.B, &b)), &(tr_mul(&self.B, &a) + mul(&self.C, &b)))
+        joined(&(mul(&self.vv, &a) + mul(&self.vw, &b)), &(tr_mul(&self.vw, &a) + mul(&self.ww, &b)))
     }
 
     /// Returns `X Y`, which must be symmetric.
     #[inline]
     fn commuting_product(&self, Y: &Self) -> Self {
-        let Bt = Y.B.transpose();
-        let A = mul3(&self.A, &Y.A) + mul3(&self.B, &Bt);
-        let B = mul3(&self.A, &Y.B) + mul3(&self.B, &Y.C);
-        let C = tr_mul3(&self.B, &Y.B) + mul3(&self.C, &Y.C);
-        Self { A: mirrored(&A), B, C: mirrored(&C) }
+        let Bt = Y.vw.transpose();
+        let vv = mul3(&self.vv, &Y.vv) + mul3(&self.vw, &Bt);
+        let vw = mul3(&self.vv, &Y.vw) + mul3(&self.vw, &Y.ww);
+        let ww = tr_mul3(&self.vw, &Y.vw) + mul3(&self.ww, &Y.ww);
+        Self { vv: mirrored(&vv), vw, ww: mirrored(&ww) }
     }
 
     /// Returns `X Y Z`, which must be symmetric.
     #[inline]
     fn symmetric_product(&self, Y: &Self, Z: &Self) -> Self {
         // Columns of Y Z.
-        let Bt = Z.B.transpose();
-        let (tt, tr) = (mul3(&Y.A, &Z.A) + mul3(&Y.B, &Bt), mul3(&Y.A, &Z.B) + mul3(&Y.B, &Z.C));
-        let (rt, rr) = (tr_mul3(&Y.B, &Z.A) + mul3(&Y.C, &Bt), tr_mul3(&Y.B, &Z.B) + mul3(&Y.C, &Z.C));
-        let A = mul3(&self.A, &tt) + mul3(&self.B, &rt);
-        let B = mul3(&self.A, &tr) + mul3(&self.B, &rr);
-        let C = tr_mul3(&self.B, &tr) + mul3(&self.C, &rr);
-        Self { A: mirrored(&A), B, C: mirrored(&C) }
+        let Bt = Z.vw.transpose();
+        let (tt, tr) = (mul3(&Y.vv, &Z.vv) + mul3(&Y.vw, &Bt), mul3(&Y.vv, &Z.vw) + mul3(&Y.vw, &Z.ww));
+        let (rt, rr) = (tr_mul3(&Y.vw, &Z.vv) + mul3(&Y.ww, &Bt), tr_mul3(&Y.vw, &Z.vw) + mul3(&Y.ww, &Z.ww));
+        let vv = mul3(&self.vv, &tt) + mul3(&self.vw, &rt);
+        let vw = mul3(&self.vv, &tr) + mul3(&self.vw, &rr);
+        let ww = tr_mul3(&self.vw, &tr) + mul3(&self.ww, &rr);
+        Self { vv: mirrored(&vv), vw, ww: mirrored(&ww) }
     }
 
-    /// Inverts by elimination of A; `None` if not positive definite.
+    /// Inverts by elimination of `vv`; `None` if not positive definite.
     #[inline]
     fn inverse(&self) -> Option<Self> {
-        let A = inverse(&self.A)?;
-        let G = mul3(&A, &self.B);
-        let C = inverse(&mirrored(&(self.C - tr_mul3(&self.B, &G))))?;
-        let B = -mul3(&G, &C);
-        Some(Self { A: mirrored(&(A - mul3(&B, &G.transpose()))), B, C: mirrored(&C) })
+        // H = vv^-1 vw, complement ww - vwᵀ H.
+        let vv = inverse(&self.vv)?;
+        let H = mul3(&vv, &self.vw);
+        let ww = inverse(&mirrored(&(self.ww - tr_mul3(&self.vw, &H))))?;
+        let vw = -mul3(&H, &ww);
+        Some(Self { vv: mirrored(&(vv - mul3(&vw, &H.transpose()))), vw, ww: mirrored(&ww) })
     }
 }
 
@@ -169,18 +170,18 @@ impl Triangle {
     #[inline]
     fn congruent(&self, X: &Symmetric) -> Symmetric {
         let Self { tv, tw, rw } = self;
-        let (t, r) = (mul3(&X.A, tw) + mul3(&X.B, rw), tr_mul3(&X.B, tw) + mul3(&X.C, rw));
-        let C = tr_mul3(tw, &t) + tr_mul3(rw, &r);
-        Symmetric { A: mirrored(&tr_mul3(tv, &mul3(&X.A, tv))), B: tr_mul3(tv, &t), C: mirrored(&C) }
+        let (t, r) = (mul3(&X.vv, tw) + mul3(&X.vw, rw), tr_mul3(&X.vw, tw) + mul3(&X.ww, rw));
+        let ww = tr_mul3(tw, &t) + tr_mul3(rw, &r);
+        Symmetric { vv: mirrored(&tr_mul3(tv, &mul3(&X.vv, tv))), vw: tr_mul3(tv, &t), ww: mirrored(&ww) }
     }
 }
 
 /// Returns `Gᵀ X G` for `G = [[1, [r]x], [0, 1]]`.
 #[inline]
 fn shifted(X: &Symmetric, r: &Vector3<f64>) -> Symmetric {
-    // A [r]x = -([r]x A)ᵀ for a symmetric A.
-    let B = X.B - cross3(r, &X.A).transpose();
-    Symmetric { A: X.A, B, C: mirrored(&(X.C - cross3(r, &B) - cross3(r, &X.B).transpose())) }
+    // vv [r]x = -([r]x vv)ᵀ for a symmetric block.
+    let vw = X.vw - cross3(r, &X.vv).transpose();
+    Symmetric { vv: X.vv, vw, ww: mirrored(&(X.ww - cross3(r, &vw) - cross3(r, &X.vw).transpose())) }
 }
 
 /// `G_p` and `G_c` of a joint, and the inverse of `G_c`.
@@ -299,8 +300,8 @@ impl Sigma {
             Self::Hard(sigma) | Self::Free(sigma) => {
                 // Σ^-1 H^-1 = (1 + σ M̃)^-1, which commutes with M̃.
                 let mut E = M.scaled(*sigma);
-                E.A += Matrix3::identity();
-                E.C += Matrix3::identity();
+                E.vv += Matrix3::identity();
+                E.ww += Matrix3::identity();
                 let E = E.inverse()?;
                 (E.commuting_product(M), E.times(&push))
             }
@@ -339,7 +340,7 @@ impl EliminatedJoint {
         }
         let (a, own) = (a / inertia, line.dot(&y) / inertia);
         let (f, t) = halves(&(a * inertia.sqrt()));
-        let outer = Symmetric { A: f * f.transpose(), B: f * t.transpose(), C: t * t.transpose() };
+        let outer = Symmetric { vv: f * f.transpose(), vw: f * t.transpose(), ww: t * t.transpose() };
         let Q_inverse = Q_inverse.plus(&outer.scaled(-1.0));
         Some(Self { Q_inverse, y: y - a * (own * inertia), free: Some((a, own)) })
     }
