@@ -18,8 +18,8 @@ pub struct FatigueCycle {
 ///
 /// * `history`: successive values, any unit, finite.
 ///
-/// Returns the cycles in the order in which they close. Cycles that contain the first point are half
-/// cycles, and so is what is left at the end.
+/// Returns the cycles in the order in which they close. Cycles that contain the first point are
+/// half cycles, and so is what is left at the end.
 ///
 /// # Source
 /// [ASTM E1049], section 5.4.4.
@@ -81,8 +81,8 @@ fn reversals(history: &[f64]) -> Vec<f64> {
     points
 }
 
-/// S-N curve of a material for fully reversed stress, with its tensile strength for the influence of
-/// the mean stress.
+/// S-N curve of a material for fully reversed stress, with its tensile strength for the influence
+/// of the mean stress.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SnCurve {
     /// Stress amplitude at the knee (Pa).

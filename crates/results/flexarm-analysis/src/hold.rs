@@ -1,8 +1,8 @@
 //! Figures of the TCP error after a move, while the joints hold: final value, settling, overshoot,
 //! ringing.
 //!
-//! Start at `Hold::metrics`. World axes, SI units. Not here: the search for holds (`metrics`), spectral
-//! lines (`spectrum`).
+//! Start at `Hold::metrics`. World axes, SI units. Not here: the search for holds (`metrics`),
+//! spectral lines (`spectrum`).
 
 use std::f64::consts::PI;
 

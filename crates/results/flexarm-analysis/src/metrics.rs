@@ -1,7 +1,7 @@
 //! The figures of a whole record.
 //!
-//! Start at [`tcp_metrics`]. World axes; path axes are tangential, normal, binormal. Not here: figures
-//! after each move (`hold`), sums over the samples (`totals`), the spectrum (`spectrum`).
+//! Start at [`tcp_metrics`]. World axes; path axes are tangential, normal, binormal. Not here:
+//! figures after each move (`hold`), sums over the samples (`totals`), the spectrum (`spectrum`).
 
 use nalgebra::Vector3;
 

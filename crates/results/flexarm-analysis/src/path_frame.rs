@@ -7,8 +7,8 @@
 //! sign on a straight line. At rest they are kept. The normal starts towards the inside of the
 //! first bend; for a plane path it stays in the plane and the binormal is perpendicular to it.
 //!
-//! World axes, SI units. Start at [`PathFrame::next`] sample by sample, at [`path_frames`] for a whole
-//! record.
+//! World axes, SI units. Start at [`PathFrame::next`] sample by sample, at [`path_frames`] for a
+//! whole record.
 
 use nalgebra::Vector3;
 

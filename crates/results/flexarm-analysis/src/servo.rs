@@ -7,8 +7,8 @@
 //! with the commands u, the motors q, the torques τ that their motion needs and the feed-forward F.
 //! The lead `u - q` obeys the equation of the servo on a rigid arm: it is stable if the servo is,
 //! and needs no look-ahead. It is integrated by backward differences of second order, which also
-//! work without feed-forward. Start at `NodeServo::leads`. Not here: the torques that the motion needs
-//! (`inversion`).
+//! work without feed-forward. Start at `NodeServo::leads`. Not here: the torques that the motion
+//! needs (`inversion`).
 
 use nalgebra::{Complex, DMatrix, DVector};
 

@@ -6,7 +6,8 @@
 //! ```
 //! Zero vibration (ZV, two copies half a damped period apart), and zero vibration and derivative
 //! (ZVD, three copies), which is robust against frequency errors [Singer & Seering 1990]. Shapers
-//! of several modes are convolved. Not here: the best shaper within a given delay (`optimal_shaper`).
+//! of several modes are convolved. Not here: the best shaper within a given delay
+//! (`optimal_shaper`).
 
 use std::f64::consts::{PI, TAU};
 

@@ -129,7 +129,8 @@ pub fn least_squares(columns: &[Vec<f64>], y: &[f64]) -> Option<Vec<f64>> {
     Some(solved.iter().zip(&sizes).map(|(x, size)| x / size).collect())
 }
 
-/// Computes the residual of [`least_squares`]: `y` minus the sum of the columns times their factors.
+/// Computes the residual of [`least_squares`]: `y` minus the sum of the columns times their
+/// factors.
 pub fn rest(columns: &[Vec<f64>], factors: &[f64], y: &[f64]) -> Vec<f64> {
     let sum = |i: usize| columns.iter().zip(factors).map(|(column, factor)| factor * column[i]).sum::<f64>();
     y.iter().enumerate().map(|(i, y)| y - sum(i)).collect()

@@ -4,7 +4,8 @@
 //! x(t) = 2 Re Σ φ (φᵀ f) / (2 λ φᵀMφ + φᵀDφ) e^(λ (t-T)),     f = -(λ² M_a + λ D_a + K_a) / λ² ∫ q̈ e^(λ (T-τ)) dτ
 //! ```
 //! about the equilibrium at the end T, where the commands q are at rest. The structure at the end
-//! is used throughout: earlier excitation has decayed. Not here: shapers that reduce it (`shaping`).
+//! is used throughout: earlier excitation has decayed. Not here: shapers that reduce it
+//! (`shaping`).
 
 use nalgebra::{Complex, DMatrix, DVector};
 

@@ -1,7 +1,7 @@
 //! A run as columns: each signal is one contiguous array with a name, a unit and a width. Every
 //! sample is kept.
 //!
-//! Start at [`Columns::push`]. Long runs are thinned for pictures by `flexarm_log::Trace`.
+//! Start at [`Columns::push`]. Not here: curves thinned for pictures (`flexarm_log::Trace`), files.
 
 use crate::{RunHeader, Sample};
 
@@ -119,6 +119,8 @@ impl Columns {
 
     /// Creates columns of the same joints, elements and contributors from stored numbers, each
     /// signal by its name.
+    ///
+    /// * `signals`: names in the order of [`Columns::columns`], each with its row-major values.
     ///
     /// `None` if they are not all signals of a run, with or without the rigid twin, in order and of
     /// equal length.

@@ -1,5 +1,8 @@
 //! Preparation of surfaces for drawing: corners are shared where the surface is smooth, and split
 //! at edges.
+//!
+//! Start at `LinkMesh::with_creases`. Link axes, m, single precision. Not here: reading mesh files
+//! (`flexarm-urdf`), drawing.
 
 use std::collections::HashMap;
 

@@ -25,6 +25,7 @@ mod helical;
 mod large_deflection;
 mod link_bodies;
 mod load_jumps;
+mod loads_and_limits;
 mod loops;
 mod magnification;
 mod model_limits;

@@ -1,7 +1,7 @@
 //! Loads as values, for programs that do not use a loads file.
 //!
-//! Wrenches act at the origin of a frame; N, N m, s. Not here: files of loads (`loads_file`), kinds of
-//! curves in them.
+//! Wrenches act at the origin of a frame; N, N m, s. Not here: files of loads (`loads_file`), kinds
+//! of curves in them.
 
 use flexarm_kinematics::{Frame, Model, Wrench};
 use flexarm_settings::{Quantity, known_names};

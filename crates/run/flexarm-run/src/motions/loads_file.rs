@@ -431,7 +431,8 @@ fn stray_key(e: &LoadEntry, kind: &str) -> Option<(&'static str, &'static str)> 
     keys.iter().find(stray).map(|(key, _, kinds)| (*key, *kinds))
 }
 
-/// Assumed longest period of an expression, whose content is unknown, for the reference stepper (s).
+/// Assumed longest period of an expression, whose content is unknown, for the reference stepper
+/// (s).
 pub(crate) const EXPRESSION_PERIOD: f64 = 5e-3;
 /// Maximum length of an expression (characters).
 const LONGEST_EXPRESSION: usize = 2000;
@@ -534,7 +535,8 @@ fn part(
     Ok((parsed, timed))
 }
 
-/// Returns an expression with its numbers such as 1e-3, which the parser does not read, as decimals.
+/// Returns an expression with its numbers such as 1e-3, which the parser does not read, as
+/// decimals.
 fn without_exponents(text: &str) -> String {
     let (mut plain, mut rest) = (String::new(), text);
     while let Some(first) = rest.chars().next() {

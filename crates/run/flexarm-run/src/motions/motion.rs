@@ -1,7 +1,7 @@
 //! Trajectories of a robot: joints in coordinate order, checked against its limits.
 //!
-//! Start at [`Motion::load`]; `Motion::of` fits a trajectory to a robot. SI units. Not here: formats
-//! of files (`motion_formats`), TCP paths (`tool_path`), mathematics of trajectories
+//! Start at [`Motion::load`]; `Motion::of` fits a trajectory to a robot. SI units. Not here:
+//! formats of files (`motion_formats`), TCP paths (`tool_path`), mathematics of trajectories
 //! (`flexarm_trajectory`).
 
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use flexarm_trajectory::{JointLimits, JointSamples, KnownJoint, LimitViolation, 
 use crate::caveat::{self, Finding};
 use crate::error::Error;
 use crate::motions::motion_formats::{self, MotionFile, MotionOptions, ReadMotion, refuse_dependent};
-use crate::motions::tool_path::{Cell, ToolPath};
+use crate::motions::tool_path::{Cell, ToolPath, held_at};
 use crate::robot::Robot;
 
 /// Trajectory whose joints are the model's actuated coordinates.
@@ -193,9 +193,8 @@ impl Motion {
         // The other joints stay where the robot file says, or at the position closest to zero.
         let still = actuated.iter().filter(|c| !trajectory.joints().contains(&c.joint));
         let place = |c: &Coordinate| {
-            let given = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
-            let at = given.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper));
-            HeldJoint { joint: c.joint.clone(), at, given: given.is_some() }
+            let (at, given) = held_at(hold, c);
+            HeldJoint { joint: c.joint.clone(), at, given }
         };
         let held: Vec<HeldJoint> = still.map(place).collect();
         let warnings = warnings(&trajectory, path);

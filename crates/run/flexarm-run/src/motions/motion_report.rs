@@ -339,8 +339,8 @@ struct Torques {
     values: Vec<Vec<f64>>,
 }
 
-/// Computes τ = M(q) q̈ + bias(q, q̇) at equal time intervals along the motion, and at each kink where
-/// the acceleration jumps.
+/// Computes τ = M(q) q̈ + bias(q, q̇) at equal time intervals along the motion, and at each kink
+/// where the acceleration jumps.
 fn torques(trajectory: &Trajectory, model: &Model) -> Torques {
     let n = model.nv();
     let (mut data, mut state, mut a) = (Data::new(model), State::zeros(model), DVector::zeros(n));
@@ -377,7 +377,8 @@ impl Torques {
 
 /// Returns a violation if a torque or force exceeds its limit (N m or N).
 ///
-/// * `worst`: torque of largest magnitude. `since_s`: time at which the limit is first exceeded (s).
+/// * `worst`: torque of largest magnitude. `since_s`: time at which the limit is first exceeded
+///   (s).
 /// * `limit`: no limit if infinite or NaN.
 pub fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64) -> Option<LimitViolation> {
     let Extreme { time_s, value } = *worst;
@@ -386,8 +387,8 @@ pub fn of_effort(joint: &str, worst: &Extreme, since_s: f64, limit: f64) -> Opti
     is_over.then_some(LimitViolation { joint, kind, time_s, since_s, value, limit })
 }
 
-/// Computes the length of the TCP path (m) and the maximum TCP speed (m/s) from chords. The length is extrapolated
-/// from chords of one and two steps (error of fourth order in the step).
+/// Computes the length of the TCP path (m) and the maximum TCP speed (m/s) from chords. The length
+/// is extrapolated from chords of one and two steps (error of fourth order in the step).
 fn length_and_speed_of_tcp(trajectory: &Trajectory, model: &Model) -> (f64, f64) {
     let (mut data, tcp) = (Data::new(model), tcp_frame(model));
     let n = model.nv();

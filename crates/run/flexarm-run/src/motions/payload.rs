@@ -1,7 +1,7 @@
 //! Payloads that are picked up and put down during a run.
 //!
-//! Start at [`PayloadChange::attach`]. Frames: L carrying link, B its body; kg, m, kg m². Not here: the
-//! robot's own payload (`robot`), files (`loads_file`).
+//! Start at [`PayloadChange::attach`]. Frames: L carrying link, B its body; kg, m, kg m². Not here:
+//! the robot's own payload (`robot`), files (`loads_file`).
 
 use flexarm_kinematics::{LinkInertia, Model, Pose, SpatialInertia};
 use flexarm_settings::{Quantity, known_names};

@@ -1,4 +1,7 @@
 //! Summary of the loaded robot, with its kinematics and dynamics at one pose.
+//!
+//! Start at [`inspect()`]. World axes at the TCP, linear rows first, SI units. Not here: the
+//! flexible arm at a pose (`posed`).
 
 use flexarm_flexlink::{FlexibleSpan, LinkForm};
 use flexarm_kinematics::{
@@ -179,10 +182,12 @@ pub struct TcpInfo {
     pub quaternion_wxyz: [f64; 4],
 }
 
+/// Returns a limit, if there is one.
 fn finite(x: f64) -> Option<f64> {
     x.is_finite().then_some(x)
 }
 
+/// Returns a matrix row by row.
 fn rows(M: &DMatrix<f64>) -> Vec<Vec<f64>> {
     M.row_iter().map(|r| r.iter().copied().collect()).collect()
 }
@@ -200,6 +205,7 @@ pub fn inspect(robot: &Robot, at: Option<&[f64]>, velocity: Option<&[f64]>) -> R
     state.q.copy_from_slice(&q);
     state.qdot.copy_from_slice(&v);
 
+    // Dynamics, kinematics of the TCP.
     let mut data = Data::new(&model);
     loops::check_pose(&model, &mut data, &state.q)?;
     balancer::check_pose(&model, &mut data, &state.q)?;

@@ -1,5 +1,7 @@
 //! Modes as a recording: each mode oscillates for a few seconds, one after another, slowly and with
 //! a visible amplitude.
+//!
+//! Start at [`Arm::record_modes`]. World frame, SI units. Not here: the modes themselves (`modes`).
 
 use std::sync::Arc;
 
@@ -65,6 +67,8 @@ impl Arm {
         };
         within(movie.seconds, Setting::Seconds, "s")?;
         movie.tool_motion_m.map_or(Ok(()), |x| within(x, Setting::ToolMotion, "m"))?;
+
+        // All modes; the lowest are shown.
         let posed = self.posed(at)?;
         let model = ModeModel::new(&posed, speeds)?;
         let linear = &model.linear;
@@ -75,6 +79,7 @@ impl Arm {
         let shown = &all[..count.min(all.len())];
         let motion = movie.tool_motion_m.unwrap_or_else(|| PART_OF_REACH * reach(&posed));
 
+        // Header: the arm, and when which mode is shown.
         let mut files = recorders(Some(outputs), false)?;
         (files.names.report, files.names.report_md) = (None, None);
         let mut header = robot_header(self.robot(), &posed.plant);
@@ -85,6 +90,8 @@ impl Arm {
         let swings = (movie.seconds * SHOWN_HZ).ceil();
         describe_modes(&mut header, shown, swings / SHOWN_HZ);
         files.begin(&header)?;
+
+        // x(t) = x_0 + size Re(-i φ e^(iωt)), each mode for the same whole number of oscillations.
         let per_mode = (swings / SHOWN_HZ * RATE_HZ).round() as u64;
         let mut stage = Stage::new(self.robot(), &posed, linear, stations);
         for (k, mode) in shown.iter().enumerate() {
@@ -106,7 +113,7 @@ impl Arm {
     }
 }
 
-/// Adds captions and tables of the modes, each shown for the same time, to the header.
+/// Adds captions and tables of the modes to the header; each is shown for `seconds` (s).
 pub fn describe_modes(header: &mut RunHeader, shown: &[DampedMode], seconds: f64) {
     header.trajectory = "modes".into();
     header.has_rigid = true;
@@ -198,6 +205,7 @@ impl<'a> Stage<'a> {
         Self { posed, linear, data, q: state.q, frames, stations, sample }
     }
 
+    /// Fills the sample of a step with the free coordinates `x`: motors under servos, then springs.
     fn sample(&mut self, step: u64, x: &DVector<f64>) -> &Sample {
         let driven = &self.posed.plant.torque_driven;
         for (value, &k) in x.iter().zip(driven) {

@@ -1,5 +1,8 @@
 //! Natural modes at a pose, with drives locked, under their servos, or turning at constant speed:
 //! frequencies, damping, TCP motion and strain energy of the links.
+//!
+//! Start at [`Arm::modes`]. World axes at the TCP, six-vectors linear first. Not here: the
+//! eigenvalue problem (`flexarm_analysis::damped_modes`), recordings of modes (`mode_recording`).
 
 use std::sync::Arc;
 
@@ -73,7 +76,8 @@ pub struct ModeFigures {
     /// Effective mass at the TCP (kg), or moment of inertia for rotations (kg m²); null at a node.
     pub effective_mass: [Option<f64>; 6],
     /// Fraction of the static compliance of the TCP carried by this mode, per direction; null where
-    /// the compliance is zero, and for a turning arm: Coriolis forces couple the shares of its modes.
+    /// the compliance is zero, and for a turning arm: Coriolis forces couple the shares of its
+    /// modes.
     pub compliance_share: [Option<f64>; 6],
     /// Share of each element in the strain energy.
     pub strain_energy: Vec<f64>,
@@ -117,11 +121,13 @@ pub(crate) fn tool_map(linear: &Linear) -> DMatrix<f64> {
     DMatrix::from_fn(6, linear.J.ncols(), |i, j| linear.J[(i, j)])
 }
 
+/// Returns first coordinate and stiffness of each elastic element.
 fn blocks(linear: &Linear) -> Vec<(usize, DMatrix<f64>)> {
     let block = |first: usize, n: usize| linear.springs.view((first, first), (n, n)).into_owned();
     linear.elements.iter().map(|(_, range)| (range.start, block(range.start, range.len()))).collect()
 }
 
+/// Returns a part of a whole; `None` if there is no whole.
 fn share(part: f64, whole: f64) -> Option<f64> {
     (whole > 0.0).then(|| part / whole)
 }
@@ -132,6 +138,7 @@ pub(crate) fn modes_of(linear: &Linear) -> Result<Vec<DampedMode>, Error> {
     damped_modes(&linear.M, &linear.D, &K).map_err(linear_error)
 }
 
+/// Returns an error about a linear model at a pose.
 pub(crate) fn linear_error(error: LinearError) -> Error {
     Error::Pose(format!("the linear model at this pose: {error}"))
 }
@@ -141,9 +148,9 @@ impl Arm {
     /// locked.
     ///
     /// * `at`: values of all actuated joints (rad or m), [`crate::Robot::start_pose`] by default.
-    /// * `speeds`: speeds of all actuated joints (rad/s or m/s). With them the modes are those about
-    ///   the equilibrium of the turning arm, with stiffening by centrifugal loads and Coriolis forces,
-    ///   the motors following their motion exactly.
+    /// * `speeds`: speeds of all actuated joints (rad/s or m/s). With them the modes are those
+    ///   about the equilibrium of the turning arm, with stiffening by centrifugal loads and
+    ///   Coriolis forces, the motors following their motion exactly.
     ///
     /// # Errors
     /// [`Error::Pose`] for joint values that do not fit, [`Error::Step`] if there is no
@@ -182,8 +189,8 @@ impl ModeModel {
         Ok(Self { linear: found.linear, damping: found.damping, speeds, change: found.change })
     }
 
-    /// Computes the undamped frequencies (Hz), from which non-proportional damping shifts the damped
-    /// ones. With locked drives they equal those of a map at this pose bit for bit.
+    /// Computes the undamped frequencies (Hz), from which non-proportional damping shifts the
+    /// damped ones. With locked drives they equal those of a map at this pose bit for bit.
     fn undamped_frequencies(&self, posed: &Posed) -> Result<Vec<f64>, Error> {
         let linear = &self.linear;
         if self.speeds.is_empty() && linear.driven == 0 {
@@ -201,6 +208,7 @@ impl ModeModel {
     }
 }
 
+/// Computes the lowest modes, with a caveat if the links have too few.
 fn lowest(posed: &Posed, speeds: Option<&[f64]>, count: usize) -> Result<ModeTable, Error> {
     let model = ModeModel::new(posed, speeds)?;
     let all = modes_of(&model.linear)?;

@@ -1,9 +1,11 @@
 //! A robot held at a pose: starting point of statics, modes and frequency response.
+//!
+//! Start at [`Arm::posed`]. World axes at the TCP, six-vectors linear first, SI units. Not here:
+//! equilibria and linearisation (`flexarm-stepping`), thousands of poses (`OperatingPoint`).
 
 use std::sync::Arc;
 
-use flexarm_analysis::engineering_strain;
-use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics, rotation_vector};
+use flexarm_kinematics::{Data, Frame, Pose, State, Wrench, forward_kinematics};
 use flexarm_settings::Quantity;
 use flexarm_stepping::{Held, Linear, OperatingPoint, Plant, StepError, linearise};
 use nalgebra::{DVector, Vector6};
@@ -17,6 +19,7 @@ use crate::motions::motion::Motion;
 use crate::robot::Robot;
 use crate::robot::balancer;
 use crate::robot::loops;
+use crate::run::monitor::strain::Strains;
 
 /// Flexible arm with its drives locked at a pose.
 pub struct Posed {
@@ -35,8 +38,8 @@ pub struct Posed {
 }
 
 impl Robot {
-    /// Returns the pose at which the robot is analysed by default (rad or m): the start of the motion
-    /// of the robot file, or zero for a robot without one.
+    /// Returns the pose at which the robot is analysed by default (rad or m): the start of the
+    /// motion of the robot file, or zero for a robot without one.
     ///
     /// # Errors
     /// [`Error::Model`].
@@ -66,7 +69,10 @@ pub fn step_error(source: StepError) -> Error {
     Error::Step { source, partial: false }
 }
 
-/// Checks a force and moment on the TCP (six values).
+/// Checks a force (N) and moment (N m) on the TCP, six values.
+///
+/// # Errors
+/// [`Error::Value`] for the first number that is not finite or out of range.
 pub fn check_wrench(wrench: &[f64]) -> Result<(), Error> {
     let force = Quantity::FORCE.check_all("the force at the tool", wrench.iter().take(3));
     let torque = Quantity::TORQUE.check_all("the torque at the tool", wrench.iter().skip(3));
@@ -111,14 +117,9 @@ impl Arm {
         // Any pose within the limits is suitable.
         let middle = |lower: f64, upper: f64| match (lower.is_finite(), upper.is_finite()) {
             (true, true) => 0.5 * (lower + upper),
+            (true, false) => lower.max(0.0),
+            (false, true) => upper.min(0.0),
             (false, false) => 0.0,
-            (finite, _) => {
-                if finite {
-                    lower.max(0.0)
-                } else {
-                    upper.min(0.0)
-                }
-            }
         };
         let actuated = &model.coordinates()[..model.n_actuated()];
         let pose = actuated.iter().map(|c| middle(c.limits.lower, c.limits.upper)).collect();
@@ -146,6 +147,7 @@ impl Posed {
         Self::of(arm, plant, at)
     }
 
+    /// Checks the pose, and completes the arm at it.
     fn of(arm: Arc<Arm>, plant: Result<Plant, StepError>, at: Vec<f64>) -> Result<Self, Error> {
         loops::check_pose(&arm.rigid, &mut Data::new(&arm.rigid), &DVector::from_column_slice(&at))?;
         balancer::check_pose(&arm.rigid, &mut Data::new(&arm.rigid), &DVector::from_column_slice(&at))?;
@@ -183,7 +185,11 @@ impl Posed {
         caveats
     }
 
-    /// Linearises about the static equilibrium under gravity and a wrench at the TCP (world axes).
+    /// Linearises about the static equilibrium under gravity and a wrench at the TCP (N, N m; world
+    /// axes).
+    ///
+    /// # Errors
+    /// As [`check_wrench`]; [`Error::Step`] if there is no equilibrium.
     pub fn linear(&self, wrench: &Vector6<f64>) -> Result<Linear, Error> {
         let F = Wrench::new(wrench.fixed_rows::<3>(0).into(), wrench.fixed_rows::<3>(3).into());
         check_wrench(wrench.as_slice())?;
@@ -231,32 +237,31 @@ impl Posed {
     }
 }
 
-/// State with the joints at the start of the motion and the elastic coordinates at zero.
-fn undeformed(plant: &Plant) -> (Data, State) {
+/// Returns the state with the joints at the start of the motion and the elastic coordinates at
+/// zero.
+pub(crate) fn undeformed(plant: &Plant) -> (Data, State) {
     let mut state = State::zeros(&plant.model);
     plant.prescribed_state(0.0, &mut state, &mut DVector::zeros(plant.model.nv()));
     (Data::new(&plant.model), state)
 }
 
-/// Engineering strain of each flexible link and rotation of its far end (rad), at coordinates `q`.
+/// Sets the elastic coordinates of a state to their equilibrium at the start of the motion.
+pub(crate) fn set_equilibrium(plant: &Plant, state: &mut State) {
+    let n = plant.model.n_actuated();
+    state.q.rows_mut(n, plant.model.nv() - n).copy_from(&plant.modes.equilibrium);
+}
+
+/// Returns the engineering strain of each flexible link and the rotation of its far end (rad), at
+/// coordinates `q`.
 pub(crate) fn strains(arm: &Arm, plant: &Plant, q: &DVector<f64>) -> Vec<(f64, f64)> {
-    let model = &plant.model;
     let (mut data, straight) = undeformed(plant);
-    let mut ends = |q: &DVector<f64>| -> Vec<Pose> {
-        forward_kinematics(model, &mut data, q);
-        let pose = |link: &str, X: &Pose| data.X_WF(model.frame(link).expect("a link of the substitution")) * *X;
-        let spans = arm.spans.iter();
-        spans.map(|s| pose(&s.link, &s.X_LA).inverse() * pose(&s.distal_link, &s.X_DB)).collect()
+    let mut poses = |q: &DVector<f64>| {
+        forward_kinematics(&plant.model, &mut data, q);
+        data.X_WB.clone()
     };
-    let (bent, straight) = (ends(q), ends(&straight.q));
-    let pairs = arm.spans.iter().zip(bent.iter().zip(&straight));
-    pairs
-        .map(|(span, (bent, straight))| {
-            let change = bent.translation.vector.norm() - span.length;
-            let strain = engineering_strain(change, span.length).map_or(0.0, f64::abs);
-            (strain, rotation_vector((straight.rotation.inverse() * bent.rotation).matrix()).norm())
-        })
-        .collect()
+    let mut strains = Strains::new(arm, &plant.model);
+    strains.update(0.0, &poses(q), &poses(&straight.q));
+    strains.result().iter().map(|link| (link.strain, link.rotation)).collect()
 }
 
 /// Checks that the figures of a result are finite.

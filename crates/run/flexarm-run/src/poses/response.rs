@@ -1,5 +1,8 @@
 //! Frequency response at a pose, with the drives locked or a joint excited: TCP motion per newton
 //! at the TCP or per radian of a joint.
+//!
+//! Start at [`Arm::response`]. World axes at the TCP, SI units, rad/s as ω and Hz in names. Not
+//! here: the transfer function and its resonances (`flexarm_analysis::LinearSystem`).
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -157,7 +160,8 @@ pub struct ResponseOutputs {
     pub overwrite: bool,
 }
 
-/// End of a band over the first and the last natural frequency, beyond which the band shows no mode.
+/// End of a band over the first and the last natural frequency, beyond which the band shows no
+/// mode.
 const BAND: [f64; 2] = [0.1, 50.0];
 
 /// Input or output channel: its name, its unit, its index and whether it is a joint.
@@ -208,6 +212,7 @@ fn response_at(posed: Posed, request: &ResponseRequest, outputs: Option<&Respons
     let paths: Vec<PathBuf> = outputs.iter().flat_map(|o| RESPONSE_FILES.map(|name| o.folder.join(name))).collect();
     check_free(&paths, outputs.is_some_and(|o| o.overwrite))?;
 
+    // The linear system, and the frequencies that resolve its response.
     let linear = posed.linear(&Vector6::zeros())?;
     let modes = modes_of(&linear)?;
     let frequencies_hz: Vec<f64> = modes.iter().map(flexarm_analysis::DampedMode::frequency_hz).collect();
@@ -220,6 +225,8 @@ fn response_at(posed: Posed, request: &ResponseRequest, outputs: Option<&Respons
     let transfer = Transfer::resolved(&system, request.quantity, &grid);
     system.check().map_err(linear_error)?;
     let curves = transfer.curves(&inputs, &channels);
+
+    // A band far from all modes, and an undamped mode in it, are likely mistakes.
     let mut caveats = posed.caveats_of(&linear, &[0.0; 6]);
     if let (Some(first), Some(last)) = (frequencies_hz.first(), frequencies_hz.last()) {
         let (kind, usual) = (UNUSUAL.with_unit("Hz"), BAND[0] * first..=BAND[1] * last);
@@ -338,6 +345,7 @@ fn range(request: &ResponseRequest, modes_hz: &[f64]) -> Result<(f64, f64), Erro
     Ok((from, to))
 }
 
+/// Returns the inputs with these names.
 fn input_channels(words: &[String], posed: &Posed) -> Result<Vec<Channel>, Error> {
     let channel = |word: &String| {
         if let Some(index) = WRENCH.iter().position(|w| w == word) {
@@ -357,6 +365,7 @@ fn input_channels(words: &[String], posed: &Posed) -> Result<Vec<Channel>, Error
     once(words.iter().map(channel).collect::<Result<_, Error>>()?, "input")
 }
 
+/// Returns the outputs with these names.
 fn output_channels(words: &[String]) -> Result<Vec<Channel>, Error> {
     let channel = |word: &String| {
         let index = AXES.iter().position(|w| w == word);
@@ -372,6 +381,7 @@ fn output_channels(words: &[String]) -> Result<Vec<Channel>, Error> {
     once(words.iter().map(channel).collect::<Result<_, Error>>()?, "output")
 }
 
+/// Rejects an empty list and repeated names.
 fn once(channels: Vec<Channel>, side: &'static str) -> Result<Vec<Channel>, Error> {
     if channels.is_empty() {
         return Err(Error::Value(format!("no {side} is given")));
@@ -384,6 +394,8 @@ fn once(channels: Vec<Channel>, side: &'static str) -> Result<Vec<Channel>, Erro
     Ok(channels)
 }
 
+/// Returns the linear system between inputs and outputs.
+///
 /// A wrench acts through `Jᵀ`. A joint acts through the inertia, damping and stiffness coupled to
 /// it, and also moves the TCP directly.
 fn system(linear: &Linear, inputs: &[Channel], outputs: &[Channel]) -> LinearSystem {
@@ -414,6 +426,7 @@ fn quantity_name(quantity: Quantity) -> &'static str {
     }
 }
 
+/// Returns the unit of an output per input.
 fn unit(output: &Channel, input: &Channel, quantity: Quantity) -> String {
     let rate = match quantity {
         Quantity::Displacement => "",
@@ -529,6 +542,8 @@ fn notes(response: &Response, marks: &[(f64, String)]) -> Vec<String> {
 }
 
 /// Formats joint positions in degrees or millimetres.
+///
+/// * `at`: rad or m, one per joint. `slides`: whether each joint is prismatic.
 pub fn pose_in_words(joints: &[String], at: &[f64], slides: &[bool]) -> String {
     let joint = |((joint, q), slides): ((&String, &f64), &bool)| match slides {
         true => format!("{joint} {} mm", rounded(1e3 * q, 1)),
@@ -544,6 +559,7 @@ fn rounded(x: f64, decimals: i32) -> f64 {
     (x * unit).round() / unit + 0.0
 }
 
+/// Writes table, picture and figures; a failed picture gives a warning.
 fn save(response: &mut Response, paths: Vec<PathBuf>) -> Result<(), Error> {
     let text = |k: usize| Some(paths[k].display().to_string());
     // A rigid robot has no curve to draw.

@@ -1,5 +1,8 @@
 //! Statics at a pose: static deflection under gravity and a wrench at the TCP, and the compliance
 //! there.
+//!
+//! Start at [`Arm::statics`]. Not here: the equilibrium (`flexarm-stepping`), its picture
+//! (`statics_picture`), maps of many poses (`flexarm-map`).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -112,6 +115,7 @@ impl Arm {
     }
 }
 
+/// Computes the figures; writes them to `paths` if given.
 fn statics_at(posed: Posed, wrench: [f64; 6], paths: Option<[std::path::PathBuf; 2]>) -> Result<Statics, Error> {
     let robot = posed.arm.robot();
     let X_rigid = posed.rigid_tool();

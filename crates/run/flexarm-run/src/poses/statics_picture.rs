@@ -1,5 +1,5 @@
 //! Statics as files: a picture of the arm at its equilibrium next to the rigid one, with the TCP
-//! compliance, and the figures.
+//! compliance, and the figures. World frame, SI units. Not here: drawing (`flexarm-draw`).
 
 use std::path::PathBuf;
 
@@ -117,10 +117,12 @@ fn scene(posed: &Posed, loaded: &Linear) -> (RunHeader, Sample) {
         let X_WL = frames.iter().map(|f| data.X_WF(f)).collect();
         TwinSample { q: posed.at.clone(), X_WL, X_WT: data.X_WF(&posed.tool), X_WS, ..TwinSample::default() }
     };
+    // The arm without and with its elastic coordinates.
     let (rigid, flexible) = (twin(&straight.q, false), twin(&loaded.q, true));
     let error_world = flexarm_analysis::tcp_error(&rigid.X_WT, &flexible.X_WT);
     let sample = Sample { flexible, rigid, error_world, ..Sample::default() };
 
+    // Magnification by the sizes of TCP displacement, rotations and arm.
     let base = sample.rigid.X_WL.first().map_or_else(Default::default, |X| X.translation.vector);
     let places = sample.rigid.X_WL.iter().chain([&sample.rigid.X_WT]);
     let turns = loaded.elements.iter().zip(&posed.plant.elements).map(|((_, range), element)| {

@@ -1,8 +1,11 @@
 //! Report of a recorded run.
+//!
+//! Start at [`report`]. Not here: reading recordings (`convert::read_run`), the page (`html`), its
+//! figures (`figure_groups`).
 
 use std::path::{Path, PathBuf};
 
-use flexarm_analysis::{ErrorRecord, MetricSettings, error_parts, tcp_metrics_on_path};
+use flexarm_analysis::{ErrorSample, LongRecord, MetricSettings};
 use flexarm_files::{check_apart, check_free, write_all};
 use flexarm_log::{EventKind, RecordingFormat, RunHeader, Trace};
 use flexarm_settings::Setting;
@@ -13,7 +16,8 @@ use crate::error::{Error, RecordingError};
 use crate::report::convert::{no_sample, read_run};
 use crate::run::magnification::fit_color_scale;
 use crate::run::stepper_settings::StepperSettings;
-use crate::run::summary::{StepperFigures, Summary, TcpFigures};
+use crate::run::study::folder_name;
+use crate::run::summary::{CURVE_PIECES, StepperFigures, Summary, TcpFigures};
 
 /// Options of a report.
 #[derive(Clone, Debug, Default)]
@@ -60,6 +64,8 @@ struct Input {
 /// [`Error::File`] if the page would replace one of its own recordings.
 pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportFiles, Error> {
     let mut warnings = Vec::new();
+
+    // The recordings; the folder of a study stands for all of its runs.
     let mut inputs = Vec::new();
     for path in recordings {
         inputs.push(Input { path: recording(path)?, of_study: None });
@@ -81,6 +87,7 @@ pub fn report(recordings: &[PathBuf], options: &ReportOptions) -> Result<ReportF
     let folder = page.with_file_name(crate::run::record::FIGURES_FOLDER);
     check_places(&inputs, &page, &folder, options)?;
 
+    // One colour scale, so that the runs can be compared by eye.
     let mut runs = read_all(&inputs, &mut warnings)?;
     fit_color_scale(runs.iter_mut().map(|(.., trace)| trace));
     let reports: Vec<ReportRun<'_>> =
@@ -153,6 +160,7 @@ fn check_places(inputs: &[Input], page: &Path, folder: &Path, options: &ReportOp
     }
 }
 
+/// Returns the recording to read: the file itself, or the one in the folder of a run.
 fn recording(path: &Path) -> Result<PathBuf, Error> {
     let fail = |what: String| Err(Error::File { path: path.to_owned(), what });
     if !path.exists() {
@@ -207,11 +215,6 @@ fn runs_of(folder: &Path, mut study: Summary, first: Vec<Input>, warnings: &mut 
     runs
 }
 
-/// Returns the folder name of a study's run, derived from the label as when it was written.
-fn folder_name(label: &str) -> String {
-    label.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' }).collect()
-}
-
 /// Returns a value of the metadata.
 pub(super) fn metadata_value<'a>(header: &'a RunHeader, group: &str, key: &str) -> Option<&'a str> {
     let (_, rows) = header.metadata.iter().find(|(name, _)| name == group)?;
@@ -227,29 +230,25 @@ fn settling_band_m(header: &RunHeader) -> Option<f64> {
 /// Computes the figures that follow from curves only.
 fn computed(trace: &Trace) -> Summary {
     let header = &trace.header;
-    let rows: Vec<_> = trace.rows.iter().filter(|row| row.error_world.iter().all(|x| x.is_finite())).collect();
-    let times: Vec<f64> = rows.iter().map(|row| row.time_s).collect();
-    let errors: Vec<[f64; 6]> = rows.iter().map(|row| row.error_world).collect();
-    let rigid_positions: Vec<[f64; 3]> = rows.iter().map(|row| row.rigid_m).collect();
     let of_kind = |kind: EventKind| trace.events().iter().filter(move |e| e.kind == kind).map(|e| e.time_s);
     let moves: Vec<(f64, f64)> = of_kind(EventKind::MoveStart).zip(of_kind(EventKind::MoveEnd)).collect();
-    let record = ErrorRecord {
-        times: &times,
-        errors: &errors,
-        rigid_positions: &rigid_positions,
-        quasi_static: None,
-        moves: &moves,
-    };
     let usual = MetricSettings::default();
-    let settings =
-        MetricSettings { settling_band_m: settling_band_m(header).unwrap_or(usual.settling_band_m), ..usual };
-    let along: Vec<[f64; 3]> = rows.iter().map(|row| [0, 1, 2].map(|c| row.error_path[c])).collect();
-    let metrics = tcp_metrics_on_path(&record, Some(&along), &settings).ok();
-    let band_m = settings.settling_band_m;
-    let tool = |m| TcpFigures::from(m).with_band(band_m);
-    let mut tcp = metrics.as_ref().filter(|_| header.has_rigid).map(tool);
-    let statics: Vec<[f64; 3]> = rows.iter().map(|row| row.static_m).collect();
-    if let (true, Ok(parts)) = (header.has_static, error_parts(&times, &errors, &statics)) {
+    let settling_band_m = settling_band_m(header).unwrap_or(usual.settling_band_m);
+
+    // The figures of the TCP as in a run.
+    let mut record = LongRecord::new(moves.clone(), false, MetricSettings { settling_band_m, ..usual });
+    for row in trace.rows.iter().filter(|row| row.error_world.iter().all(|x| x.is_finite())) {
+        record.push(&ErrorSample {
+            time_s: row.time_s,
+            error: row.error_world,
+            path_error: [0, 1, 2].map(|c| row.error_path[c]),
+            rigid_position: row.rigid_m,
+            static_m: row.static_m,
+        });
+    }
+    let metrics = record.metrics().ok().filter(|_| header.has_rigid);
+    let mut tcp = metrics.as_ref().map(|metrics| TcpFigures::from(metrics).with_band(settling_band_m));
+    if let (true, Ok(parts)) = (header.has_static, record.parts()) {
         tcp = tcp.map(|tcp| tcp.with_parts(&parts));
     }
     if let Some(tcp) = tcp.as_mut().filter(|_| moves.is_empty()) {
@@ -257,6 +256,8 @@ fn computed(trace: &Trace) -> Summary {
         // frequency.
         (tcp.dominant_hz, tcp.settling_s) = (None, None);
     }
+
+    // Names and settings, from the metadata if the recording has them.
     let named = |name: &str, otherwise: &str| if name.is_empty() { otherwise.to_owned() } else { name.to_owned() };
     let run = |key: &str| metadata_value(header, "flexarm.run", key);
     let flexible = if header.elements.is_empty() { "" } else { "flexible" };
@@ -274,7 +275,7 @@ fn computed(trace: &Trace) -> Summary {
         },
         duration_s: trace.rows.last().map_or(0.0, |row| row.time_s),
         tcp,
-        error_curve: crate::run::summary::thinned(&times, &errors),
+        error_curve: record.largest_errors(CURVE_PIECES),
         moves_s: moves.iter().map(|&(start, end)| [start, end]).collect(),
         computed: true,
         ..Summary::default()

@@ -1,4 +1,7 @@
 //! Conversion of recordings between formats, and reading them into memory.
+//!
+//! Start at [`convert()`] and [`read_run`]. Not here: the formats (`flexarm-log`), the report
+//! (`again`).
 
 use std::io::ErrorKind;
 use std::ops::ControlFlow;
@@ -77,6 +80,7 @@ pub fn convert_until(
     flexarm_files::check_apart(&[output.to_owned()], &[input])?;
     flexarm_files::check_free(&[output.to_owned()], options.overwrite)?;
 
+    // The last moment to stop without having created a file.
     if progress(0.0).is_break() {
         return Err(Error::Interrupted { t: 0.0, partial: false });
     }
@@ -168,6 +172,7 @@ pub fn parse_recording_format(word: &str) -> Result<RecordingFormat, RecordingEr
     RecordingFormat::from_word(word).ok_or(RecordingError::UnknownFormat)
 }
 
+/// Returns the format of a file, by its extension unless it is given.
 fn format(path: &Path, given: Option<RecordingFormat>, setting: Option<Setting>) -> Result<RecordingFormat, Error> {
     if path.is_dir() {
         let what = "is a folder, a recording is a file: give one in it, such as run.mcap".into();
@@ -183,6 +188,7 @@ fn format(path: &Path, given: Option<RecordingFormat>, setting: Option<Setting>)
     Ok(format)
 }
 
+/// Opens a recording for reading.
 fn open(path: &Path, format: RecordingFormat) -> Result<Box<dyn RunSource>, Error> {
     if !path.exists() {
         let what = "there is no such file: give a recording that flexarm compare or run wrote".into();

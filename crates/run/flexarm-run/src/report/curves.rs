@@ -1,4 +1,8 @@
 //! Data of the plots: curves of a run in readable units, thinned such that peaks remain.
+//!
+//! Start at `plots` (one run) and `overlays` (several). Units are those of the labels (mm, mrad, °,
+//! N). Not here: the curves of a run (`flexarm_log::Trace`), drawing (`figures`,
+//! `assets/report.js`).
 
 use flexarm_analysis::amplitude_spectrum;
 use flexarm_log::{CurveQuantity, GaugeQuantity, Trace};
@@ -61,6 +65,7 @@ pub(super) struct Table {
     pub(super) is_thinned: bool,
 }
 
+/// Values of a curve, one per x value of its table.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Curve {
     pub(super) name: String,
@@ -84,12 +89,14 @@ pub(super) enum Kind {
 }
 
 impl Kind {
+    /// Returns the style of a link, spring or joint.
     fn of(trace: &Trace, name: &str) -> Self {
         Self::Part(trace.header.color_number(name))
     }
 }
 
 impl Table {
+    /// Creates a table of at most about `most` points, fewer with many curves.
     fn new(x: Vec<f64>, curves: Vec<Curve>, most: usize) -> Self {
         let most = most.min(MAX_NUMBERS / (curves.len() + 1)).max(200);
         let keep = thinned(&curves.iter().map(|c| c.y.as_slice()).collect::<Vec<_>>(), x.len(), most);
@@ -128,7 +135,7 @@ fn curve(trace: &Trace, name: impl Into<String>, kind: Kind, scale: f64, of: Cur
     Curve { name: name.into(), kind, y }
 }
 
-/// Curves along the axes x, y and z.
+/// Returns curves along the axes x, y and z.
 fn axes(trace: &Trace, scale: f64, of: impl Fn(usize) -> CurveQuantity) -> Vec<Curve> {
     let names = ["x", "y", "z"].iter().enumerate();
     names.map(|(k, name)| curve(trace, *name, Kind::Axis(k), scale, of(k))).collect()
@@ -159,10 +166,12 @@ pub(super) fn plots(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     plots
 }
 
+/// Returns an empty plot over time.
 fn over_time(id: &'static str, section: &'static str, title: &'static str) -> Plot {
     Plot { id, section, title, x_label: "time", x_unit: "s", over_time: true, ..Plot::default() }
 }
 
+/// Returns the views of a plot without a selector.
 fn one_view(table: Table) -> Vec<PlotView> {
     vec![PlotView { tables: vec![table], ..PlotView::default() }]
 }
@@ -171,6 +180,7 @@ const TOOL: &str = "Tool";
 const PARTS: &str = "Links and elastic elements";
 const DRIVES: &str = "Joints and energy";
 
+/// Plot of the TCP error, and of its static and dynamic part.
 fn error(trace: &Trace) -> Plot {
     let mut curves = vec![curve(trace, "size", Kind::Total, 1e3, CurveQuantity::ErrorSize)];
     curves.extend(axes(trace, 1e3, CurveQuantity::Error));
@@ -222,6 +232,7 @@ fn path_curves(trace: &Trace) -> Vec<Curve> {
     curves
 }
 
+/// Plot of the deviation in path axes over time.
 fn path_over_time(trace: &Trace) -> Plot {
     Plot {
         y_label: "deviation",
@@ -232,6 +243,7 @@ fn path_over_time(trace: &Trace) -> Plot {
     }
 }
 
+/// Plot of the same over the length of the path.
 fn path_over_length(trace: &Trace) -> Plot {
     Plot {
         id: "path_length",
@@ -273,6 +285,7 @@ fn amplitudes(errors: &[(f64, [f64; 3])]) -> Option<(Vec<f64>, Vec<Curve>)> {
     Some((spectrum.hz, curves))
 }
 
+/// Plot of the spectrum of the error, at each stop and over the whole run.
 fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
     let errors = trace.beginning();
     let (hz, curves) = amplitudes(&errors)?;
@@ -280,9 +293,9 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
     // frequencies.
     let total = &curves[0].y;
     let largest = total.iter().copied().fold(0.0, f64::max);
-    let loud = total.iter().rposition(|a| *a > QUIET * largest).map_or(0.0, |k| hz[k]);
+    let significant_hz = total.iter().rposition(|a| *a > QUIET * largest).map_or(0.0, |k| hz[k]);
     let natural = summary.frequencies_hz.get(2).or(summary.frequencies_hz.last()).copied().unwrap_or(0.0);
-    let end = (1.1 * loud).max(1.2 * natural).min(*hz.last()?);
+    let end = (1.1 * significant_hz).max(1.2 * natural).min(*hz.last()?);
     let shown = |hz: &[f64], curves: Vec<Curve>| {
         let range = 1..hz.partition_point(|f| *f <= end).max(2).min(hz.len());
         let curves = curves.into_iter().map(|c| Curve { y: c.y[range.clone()].to_vec(), ..c });
@@ -324,6 +337,7 @@ fn spectrum(summary: &Summary, trace: &Trace) -> Option<Plot> {
     })
 }
 
+/// Plot of the TCP displacement by each contributor.
 fn contributions(trace: &Trace) -> Option<Plot> {
     let names = &trace.header.contributors;
     if names.is_empty() {
@@ -373,6 +387,7 @@ fn elements(summary: &Summary, trace: &Trace) -> Vec<Plot> {
     if names.is_empty() {
         return Vec::new();
     }
+    // First the magnitudes of all elements, then the components of each as a view of its own.
     let make = |plot: Plot, scale: f64, size: fn(usize) -> CurveQuantity, part: fn(usize, usize) -> CurveQuantity| {
         let sizes = names.iter().enumerate();
         let sizes = sizes.map(|(k, name)| curve(trace, name.clone(), Kind::of(trace, name), scale, size(k)));
@@ -429,10 +444,12 @@ fn is_zero(plot: &Plot) -> bool {
     tables.flat_map(|table| &table.curves).flat_map(|curve| &curve.y).all(|y| *y == 0.0)
 }
 
+/// Returns whether a joint is prismatic.
 fn slides(trace: &Trace, joint: usize) -> bool {
     trace.header.prismatic.get(joint).copied().unwrap_or(false)
 }
 
+/// Plot of the drive forces: of all joints, and of each beside the rigid twin.
 fn torques(trace: &Trace) -> Plot {
     let names = &trace.header.joints;
     let all = names.iter().enumerate();
@@ -462,6 +479,7 @@ fn torques(trace: &Trace) -> Plot {
     Plot { y_label, y_unit, note, views, ..over_time("torques", DRIVES, "Joint torques") }
 }
 
+/// Plots of the joint positions: revolute ones, then prismatic ones.
 fn joints(trace: &Trace) -> Vec<Plot> {
     let make = |sliding: bool| {
         let names = trace.header.joints.iter().enumerate().filter(|(k, _)| slides(trace, *k) == sliding);
@@ -483,6 +501,7 @@ fn joints(trace: &Trace) -> Vec<Plot> {
     [make(false), make(true)].into_iter().flatten().collect()
 }
 
+/// Plot of the energies.
 fn energy(trace: &Trace) -> Plot {
     let start = trace.rows.first().map_or(0.0, |row| row.energy.potential);
     let names = ["kinetic", "gravity", "elastic"].iter().enumerate();
@@ -500,6 +519,7 @@ fn energy(trace: &Trace) -> Plot {
 
 /// Returns the plots that overlay several runs, one curve per run.
 pub(super) fn overlays(runs: &[(&str, &Summary, &Trace)]) -> Vec<Plot> {
+    // The table of a plot that has the wanted curve, reduced to it and named after the run.
     let only = |plot: Plot, wanted: &str, label: &str| {
         let mut tables = plot.views.into_iter().flat_map(|view| view.tables);
         let mut table = tables.find(|table| table.curves.iter().any(|curve| curve.name == wanted))?;

@@ -53,10 +53,12 @@ fn moves(trace: &Trace) -> Vec<(f64, f64)> {
     moves
 }
 
+/// Returns the unit of the curves of a view.
 fn unit_of<'a>(plot: &'a Plot, view: &'a PlotView) -> &'a str {
     if view.y_unit.is_empty() { plot.y_unit } else { view.y_unit }
 }
 
+/// Draws a view of a plot at column width; moves are shaded bands.
 fn svg(plot: &Plot, view: &PlotView, bands: &[(f64, f64)]) -> Result<String, flexarm_draw::PlotError> {
     let curves = view.tables.iter().flat_map(|table| {
         table.curves.iter().map(|curve| PlotCurve {

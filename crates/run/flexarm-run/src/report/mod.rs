@@ -66,6 +66,7 @@ pub(crate) fn write_study(outputs: &Outputs, summary: &Summary, traces: &[(Strin
     write_page(outputs, summary, &html(&runs))
 }
 
+/// Writes report and `summary.json`.
 fn write_page(outputs: &Outputs, summary: &Summary, page: &str) -> Result<(), Error> {
     let json = serde_json::to_string_pretty(summary).expect("plain numbers and strings") + "\n";
     let files = [("report.md", markdown(summary)), ("report.html", page.to_owned()), ("summary.json", json)];
@@ -78,7 +79,7 @@ pub(crate) fn timeless_rows(summary: &Summary) -> Vec<(String, String)> {
     rows(summary).into_iter().filter(|(name, _)| !of_run.contains(name)).collect()
 }
 
-/// Returns the summary as a Markdown page.
+/// Returns the summary as a Markdown page: headline, table of figures, runs of the study, warnings.
 pub fn markdown(summary: &Summary) -> String {
     let mut page = format!("# {} on {}\n\n", markdown_text(&summary.robot), markdown_text(&summary.trajectory));
     if !summary.headline.is_empty() {
@@ -101,7 +102,8 @@ pub fn markdown(summary: &Summary) -> String {
     page
 }
 
-/// Returns the figures for the reader in readable units, without groups.
+/// Returns the figures for the reader in readable units, without groups: name, and value with unit
+/// and note.
 pub fn rows(summary: &Summary) -> Vec<(String, String)> {
     let text = |row: Figure| {
         let parts = [row.value.as_str(), row.unit].into_iter().filter(|part| !part.is_empty());
@@ -172,6 +174,7 @@ pub fn figure_groups(summary: &Summary) -> Vec<FigureGroup> {
 /// Number of decimals of lengths in mm.
 const MM_DIGITS: usize = 4;
 
+/// Formats a length in m as mm, or an angle in rad as mrad.
 fn mm(x: f64) -> String {
     format!("{:.MM_DIGITS$}", 1e3 * x)
 }
@@ -181,6 +184,7 @@ const ENDLESS: f64 = 1e12;
 
 /// Returns the figures of the stress of links; `is_run`: with the time of the maximum and the life.
 pub fn stress_figures(links: &[LinkStressFigures], is_run: bool) -> Vec<Figure> {
+    // Worst place of a link: stress, share of the strength, life, position.
     let row = |link: &LinkStressFigures| {
         let place = link.worst.first()?;
         let [x, y, z] = place.position_m.map(|x| format!("{:.0}", 1e3 * x));
@@ -203,6 +207,7 @@ pub fn stress_figures(links: &[LinkStressFigures], is_run: bool) -> Vec<Figure> 
         let beyond = place.of_yield.is_some_and(|share| share > 1.0);
         Some(Figure { weight: if beyond { Weight::Alert } else { Weight::Plain }, ..figure })
     };
+    // A stress point is a link with one place.
     let point = |point: &StressPointFigures| {
         let worst = vec![point.place.clone()];
         row(&LinkStressFigures { name: point.name.clone(), worst, ..LinkStressFigures::default() })
@@ -223,6 +228,7 @@ pub fn stress_figures(links: &[LinkStressFigures], is_run: bool) -> Vec<Figure> 
     figures.collect()
 }
 
+/// Returns the figures of the TCP.
 fn tool_figures(summary: &Summary) -> Vec<Figure> {
     let mut rows = Vec::new();
     if summary.end != "complete" {
@@ -230,6 +236,7 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
         rows.push(Figure { weight: Weight::Alert, ..stopped });
     }
     let Some(tcp) = &summary.tcp else { return rows };
+    // Peak with its parts, and the whole run.
     let peak = Figure::new("peak TCP error", mm(tcp.peak_m), "mm", format!("at {:.3} s", tcp.t_peak_s));
     rows.push(Figure { weight: Weight::Headline, ..peak });
     if let (Some(at_rest), Some(moving), Some(most), Some(t)) =
@@ -242,6 +249,7 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
         rows.push(Figure::new("dynamic part of the peak", parts[1].clone(), "mm", note));
     }
     rows.push(Figure::new("RMS TCP error", mm(tcp.rms_m), "mm", ""));
+    // Along and across the path.
     let [along, normal, binormal] = tcp.path_peak_m;
     rows.push(Figure::new("peak along the path", mm(along), "mm", ""));
     let across = format!("binormal {} mm", mm(binormal));
@@ -260,6 +268,7 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
         rows.push(Figure::new("across, work shifted", mm(path.left_m), "mm", note));
         rows.push(Figure::new("corner overshoot", mm(path.corner_overshoot_m), "mm", "beyond the static deflection"));
     }
+    // At rest, and after moves.
     rows.push(Figure::new("static sag at the start", mm(tcp.static_sag_m), "mm", ""));
     rows.push(Figure::new("error at the end", mm(tcp.end_m), "mm", ""));
     let rms = format!("RMS {} mrad", mm(tcp.rms_rad));
@@ -282,6 +291,7 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
     rows
 }
 
+/// Returns the figures of links and drives, frequencies and energies.
 fn part_figures(summary: &Summary) -> Vec<Figure> {
     let mut rows = Vec::new();
     let shares = part_shares(summary);
@@ -331,6 +341,7 @@ fn part_figures(summary: &Summary) -> Vec<Figure> {
     rows
 }
 
+/// Returns the figures of the computation; they depend on the machine.
 fn run_figures(summary: &Summary) -> Vec<Figure> {
     let s = &summary.stepper;
     let evaluations = s.evaluations as f64 / s.steps.max(1) as f64;

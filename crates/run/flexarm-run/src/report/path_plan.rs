@@ -1,8 +1,9 @@
-//! Plan of the TCP path with the magnified error across it.
+//! Plan of the TCP path with the magnified error across it. World axes, m; the drawing in mm.
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve, plan_plot};
 use nalgebra::{Matrix3, Vector3};
 
+use crate::run::magnification::round_down;
 use crate::run::monitor::tool_path::PathFigures;
 
 /// Displayed size of the maximum error, relative to the size of the path.
@@ -24,6 +25,7 @@ pub(crate) fn path_plan(figures: &PathFigures) -> Option<PathPlan> {
     if points.len() < 3 {
         return None;
     }
+    // Best-fit plane, and the errors without the offset of the workpiece.
     let mean = points.iter().map(|(p, _)| p).sum::<Vector3<f64>>() / points.len() as f64;
     let [u, v] = plane(points.iter().map(|(p, _)| p - mean));
     let offset = Vector3::from(figures.offset_m);
@@ -34,7 +36,7 @@ pub(crate) fn path_plan(figures: &PathFigures) -> Option<PathPlan> {
     if !(size > 0.0 && largest > 0.0) {
         return None;
     }
-    let factor = rounded(SHOWN * size / largest);
+    let factor = round_down(SHOWN * size / largest);
     let place = |enlarged: f64| points.iter().map(move |(p, e)| p + (e - offset) * enlarged);
     let curve = |name: String, look: CurveLook, enlarged: f64| {
         let places: Vec<[f64; 2]> = place(enlarged).map(|p| within(&p).map(|x| 1e3 * x)).collect();
@@ -73,18 +75,4 @@ fn named(axis: &Vector3<f64>) -> String {
         return ["x", "y", "z"][largest].to_owned();
     }
     format!("along ({:.2}, {:.2}, {:.2})", axis.x, axis.y, axis.z)
-}
-
-/// Maximum of 1, 2 or 5 times a power of ten that does not exceed `x`.
-fn rounded(x: f64) -> f64 {
-    let power = 10f64.powf(x.log10().floor());
-    let digit = x / power;
-    power
-        * if digit >= 5.0 {
-            5.0
-        } else if digit >= 2.0 {
-            2.0
-        } else {
-            1.0
-        }
 }

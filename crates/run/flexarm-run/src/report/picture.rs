@@ -1,4 +1,4 @@
-//! The arm at the time of the maximum error, from two sides.
+//! The arm at the time of the maximum error, from two sides. Not here: rendering (`flexarm-draw`).
 
 use flexarm_log::Trace;
 

@@ -33,6 +33,7 @@ pub(super) fn part_shares(summary: &Summary) -> Vec<PartShare<'_>> {
     let known = |name: &str, kinds: &[&str]| {
         shares.iter().find(|share| share.name == name && kinds.contains(&share.kind.as_str()))
     };
+    // Links and drives have figures of their own; servos and the stepper have a share only.
     let links = summary.links.iter().map(|link| {
         let share = known(&link.name, &[headline::LINK, headline::MOUNTING]);
         PartShare {

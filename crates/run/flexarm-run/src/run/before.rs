@@ -1,4 +1,7 @@
 //! Caveats before the first step, for single runs and for studies.
+//!
+//! Not here: errors in the input (`prepare`), caveats about the result (`figures`), thresholds
+//! (`caveat`).
 
 use flexarm_kinematics::State;
 use flexarm_stepping::{Plant, StepRule, StepperKind};
@@ -10,7 +13,7 @@ use crate::arm::options::RunOptions;
 use crate::caveat::pose::ArmAtRest;
 use crate::caveat::{Finding, kinds, of_use, validity};
 use crate::motions::motion::Motion;
-use crate::poses::posed::strains;
+use crate::poses::posed::{set_equilibrium, strains, undeformed};
 
 /// Minimum number of steps per period of a gear's ripple, for which a second-order stepper has an
 /// amplitude error of a few per cent.
@@ -72,16 +75,14 @@ impl BeforeRun<'_> {
 
     /// Checks for links that deflect too far at rest.
     fn links_at_rest(&self) -> Vec<Finding> {
-        let (plant, model) = (self.plant, &self.plant.model);
-        let mut state = State::zeros(model);
-        plant.prescribed_state(0.0, &mut state, &mut DVector::zeros(model.nv()));
-        let n = model.n_actuated();
-        state.q.rows_mut(n, model.nv() - n).copy_from(&plant.modes.equilibrium);
+        let plant = self.plant;
+        let (_, mut state) = undeformed(plant);
+        set_equilibrium(plant, &mut state);
         let links = self.arm.spans.iter().zip(strains(self.arm, plant, &state.q));
         links.flat_map(|(span, (strain, rotation))| validity::link(&span.link, rotation, strain)).collect()
     }
 
-    /// Reports damping that the stepper must approximate.
+    /// Returns a caveat about damping that the stepper must approximate.
     fn spook(&self) -> Option<Finding> {
         let changes = matches!(self.options.stepper, StepperKind::Spook(_)) && !self.plant.proportional;
         changes.then(|| {
@@ -102,6 +103,7 @@ impl BeforeRun<'_> {
         if plant.transmission.is_empty() || self.options.stepper.entry().steps == StepRule::ByErrorControl {
             return None;
         }
+        // Highest speed of each motor, then the ripple with the most cycles per second.
         let mut state = State::zeros(model);
         let mut fastest = vec![0.0f64; model.n_actuated()];
         for k in 0..=1000 {

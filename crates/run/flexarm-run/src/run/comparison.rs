@@ -1,4 +1,6 @@
 //! Comparison of finished runs: their distances from the first one, and the table of their figures.
+//!
+//! Positions in the world, m, s. Not here: running them (`study`), the page (`report::html`).
 
 use flexarm_log::{Trace, TraceRow};
 use flexarm_settings::written::{markdown, markdown_row};
@@ -107,7 +109,8 @@ fn between(rows: &[TraceRow], values: &[[f64; 3]], k: usize, t: f64) -> [f64; 3]
     })
 }
 
-/// Table of the runs of a study: a header, then one row per run. Empty for a single run.
+/// Returns the table of the runs of a study: a header with units, then one row per run. Empty for a
+/// single run.
 pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
     if summary.with.is_empty() {
         return Vec::new();
@@ -127,6 +130,7 @@ pub fn study_rows(summary: &Summary) -> Vec<Vec<String>> {
         "of peak [%]",
         "CPU [ms/s]",
     ];
+    // A dash where a run does not have the figure.
     let mut rows = vec![header.map(str::to_owned).to_vec()];
     for run in std::iter::once(summary).chain(&summary.with) {
         let tcp = run.tcp.as_ref();

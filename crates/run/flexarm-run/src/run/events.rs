@@ -1,4 +1,4 @@
-//! Events of a run, for recordings and reports.
+//! Events of a run, for recordings and reports. Not here: caveats about the result (`figures`).
 
 use flexarm_analysis::TcpMetrics;
 use flexarm_log::{Event, EventKind};

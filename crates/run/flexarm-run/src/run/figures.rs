@@ -1,7 +1,10 @@
 //! Computes the figures of a run from its monitors, and checks whether its models are valid.
+//!
+//! Start at `RunLoop::summary`. Not here: sums and maxima during the run (`monitor`), thresholds
+//! and sentences of caveats (`caveat`).
 
 use flexarm_analysis::TcpMetrics;
-use flexarm_kinematics::{Data, Frame, State, forward_kinematics};
+use flexarm_kinematics::{Frame, forward_kinematics};
 use flexarm_log::Event;
 use flexarm_stepping::Plant;
 
@@ -10,6 +13,7 @@ use super::{Detail, RunLoop, moves};
 use crate::arm::Owner;
 use crate::arm::options::RunOptions;
 use crate::caveat::{Finding, drives, kinds, validity};
+use crate::poses::posed::{set_equilibrium, undeformed};
 use crate::run::headline::{self, Bending, ShareFigures};
 use crate::run::monitor::stress::StressMonitor;
 use crate::run::summary::{CURVE_PIECES, DriveFigures, LinkFigures, StepperFigures, Summary, TcpFigures};
@@ -58,6 +62,7 @@ impl RunLoop<'_> {
         (summary, events)
     }
 
+    /// Returns what the flexible links contribute, and how far they deform.
     fn link_figures(&self) -> Vec<LinkFigures> {
         let measured = self.monitors.contributions.result().iter().zip(self.monitors.strains.result());
         let figures = self.arm.spans.iter().zip(measured).map(|(span, (moved, strained))| LinkFigures {
@@ -69,6 +74,7 @@ impl RunLoop<'_> {
         figures.collect()
     }
 
+    /// Returns what the elastic drives contribute, and how far they deflect.
     fn drive_figures(&self) -> Vec<DriveFigures> {
         let moved = &self.monitors.contributions.result()[self.arm.spans.len()..];
         let measured = moved.iter().zip(self.monitors.deflections.result());
@@ -84,6 +90,7 @@ impl RunLoop<'_> {
         figures.collect()
     }
 
+    /// Returns the figures of the TCP with its static and dynamic part.
     fn tool_figures(&self, metrics: &TcpMetrics, static_sag_m: f64) -> TcpFigures {
         let figures = TcpFigures {
             static_sag_m,
@@ -185,16 +192,13 @@ impl RunLoop<'_> {
     }
 }
 
-/// TCP error with the drives at rest in their initial position, also for runs that start undeformed
-/// (m).
+/// Computes the TCP error with the drives at rest in their initial position, also for runs that
+/// start undeformed (m).
 pub fn static_sag(plant: &Plant, tcp: &Frame) -> f64 {
-    let model = &plant.model;
-    let (mut data, mut state) = (Data::new(model), State::zeros(model));
-    plant.prescribed_state(0.0, &mut state, &mut nalgebra::DVector::zeros(model.nv()));
-    forward_kinematics(model, &mut data, &state.q);
+    let (mut data, mut state) = undeformed(plant);
+    forward_kinematics(&plant.model, &mut data, &state.q);
     let rigid = data.X_WF(tcp).translation.vector;
-    let n = model.n_actuated();
-    state.q.rows_mut(n, model.nv() - n).copy_from(&plant.modes.equilibrium);
-    forward_kinematics(model, &mut data, &state.q);
+    set_equilibrium(plant, &mut state);
+    forward_kinematics(&plant.model, &mut data, &state.q);
     (data.X_WF(tcp).translation.vector - rigid).norm()
 }

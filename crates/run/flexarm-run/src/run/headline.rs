@@ -1,4 +1,7 @@
 //! Headline of every result: the TCP error, its static part, and the main contributors.
+//!
+//! Start at `headline`. Lengths in mm. Not here: the figures themselves (`figures`), settling in
+//! words (`settling`).
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +25,7 @@ pub struct Bending {
 }
 
 impl Bending {
-    /// Whether nothing is elastic.
+    /// Returns whether nothing is elastic.
     pub fn is_nothing(&self) -> bool {
         self.links.is_empty() && self.gearboxes.is_empty() && self.mounting.is_none()
     }
@@ -81,6 +84,7 @@ fn why_nothing(by_choice: bool) -> &'static str {
     }
 }
 
+/// Lists the elastic parts.
 fn what_bends(bends: &Bending) -> String {
     let list = |one: &str, several: &str, names: &[String]| match names {
         [] => None,
@@ -96,7 +100,7 @@ fn what_bends(bends: &Bending) -> String {
     format!("flexible: {}", kinds.join("; "))
 }
 
-/// Number of decimals that shows a length (mm) to three significant figures.
+/// Returns the number of decimals that shows a length (mm) to three significant figures.
 pub(crate) fn digits(size_mm: f64) -> usize {
     if size_mm > 0.0 { (2.0 - size_mm.log10().floor()).clamp(1.0, 9.0) as usize } else { 2 }
 }
@@ -120,6 +124,7 @@ pub fn rounded(parts: &[f64], whole: f64, digits: usize) -> Vec<String> {
     units.iter().map(|units| format!("{:.digits$}", units * unit + 0.0)).collect()
 }
 
+/// Describes the peak with its static and dynamic part.
 fn parts(tcp: &TcpFigures) -> String {
     let digits = digits(1e3 * tcp.peak_m);
     let mm = |x: f64| format!("{:.digits$}", 1e3 * x);
@@ -134,7 +139,7 @@ fn parts(tcp: &TcpFigures) -> String {
     }
 }
 
-/// Figures of a TCP path, which come first in the headline.
+/// Describes the error across a TCP path, which comes first in the headline.
 fn across(path: &PathFigures) -> String {
     let digits = digits(1e3 * path.across_peak_m);
     let mm = |x: f64| format!("{:.digits$}", 1e3 * x);
@@ -151,12 +156,14 @@ const GROUPS: [(&str, &str); 5] = [
     (STEPPER, "constraint drift of the step"),
 ];
 
+/// Describes the contributions to the peak by kind, and the largest contributor.
 fn shares(tcp: &TcpFigures) -> String {
     let digits = digits(1e3 * tcp.peak_m);
     let most = tcp.shares_at_peak.iter().max_by(|a, b| a.along_m.abs().total_cmp(&b.along_m.abs()));
     let of_kind = |kind: &str| tcp.shares_at_peak.iter().filter(move |share| share.kind == kind).collect::<Vec<_>>();
     let groups = GROUPS.map(|(kind, word)| (kind, word, of_kind(kind)));
     let groups: Vec<_> = groups.into_iter().filter(|(.., shares)| !shares.is_empty()).collect();
+    // Rounded sums add up to the rounded peak; a drift that rounds to zero is left out.
     let sums: Vec<f64> =
         groups.iter().map(|(.., shares)| 1e3 * shares.iter().map(|share| share.along_m).sum::<f64>()).collect();
     let parts = groups.iter().zip(rounded(&sums, 1e3 * tcp.peak_m, digits));

@@ -1,4 +1,7 @@
 //! Magnification of deflections in a recording, chosen before the run.
+//!
+//! Start at `Expected::of`. World axes, SI units. Not here: magnified poses (`flexarm-log`),
+//! pictures (`flexarm-draw`).
 
 use flexarm_kinematics::{Frame, frame_jacobian};
 use flexarm_log::Trace;
@@ -53,29 +56,31 @@ impl Expected {
                 let frame = Frame { name: String::new(), body: load.body, X_BF: load.X_BF };
                 frame_jacobian(&plant.model, &twin.data, &frame, &mut J);
                 let R = twin.data.X_WF(&frame).rotation;
-                let turn = |v| if load.wrench.axes == LoadAxes::Frame { R * v } else { v };
+                let in_world = |v| if load.wrench.axes == LoadAxes::Frame { R * v } else { v };
                 let mut F = Vector6::zeros();
                 for k in 0..PIECES {
                     let share = (f64::from(k) + 0.5) / f64::from(PIECES) - 0.5;
                     let now = load.wrench.at((t + share * window).max(0.0));
-                    let (force, torque) = (turn(now.force), turn(now.torque));
+                    let (force, torque) = (in_world(now.force), in_world(now.torque));
                     F += Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z) / f64::from(PIECES);
                 }
                 twin.data.tau -= J.tr_mul(&F) * sudden;
             }
+            // TCP displacement, and largest rotation of a spring.
             let mut moved = Vector6::zeros();
             for element in &plant.elements {
                 let (first, n) = (element.coordinate, element.size);
                 let e = -(&element.C * twin.data.tau.rows(first, n));
                 moved += twin.J.columns(first, n) * &e;
-                let turn = match (element.modal, n) {
+                let turned = match (element.modal, n) {
                     (false, 6) => e.rows(3, 3).norm(),
                     (false, _) => e.norm(),
                     (true, _) => 0.0,
                 };
-                expected.turn_rad = expected.turn_rad.max(turn);
+                expected.turn_rad = expected.turn_rad.max(turned);
             }
             expected.tool_m = expected.tool_m.max(moved.fixed_rows::<3>(0).norm());
+            // Reach and bounding box of the arm.
             let tool = twin.data.X_WF(tcp).translation.vector;
             let far = twin.data.X_WB.iter().skip(1).map(|X| (X.translation.vector - tool).norm());
             expected.reach_m = far.fold(expected.reach_m, f64::max);
@@ -134,23 +139,23 @@ pub(crate) fn fit_color_scale<'a>(traces: impl IntoIterator<Item = &'a mut Trace
     }
 }
 
-/// Maximum of 1, 2, 5 times a power of ten that does not exceed `x`.
-fn round_down(x: f64) -> f64 {
+/// Returns the maximum of 1, 2, 5 times a power of ten that does not exceed `x`.
+pub(crate) fn round_down(x: f64) -> f64 {
     let decade = 10f64.powf(x.log10().floor());
     [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|y| *y <= x * (1.0 + 1e-9)).unwrap_or(decade)
 }
 
-/// Minimum round number not below `x`, larger by at most a third; 0 for 0.
+/// Returns the minimum round number not below `x`, larger by at most a third; 0 for 0.
 fn end_of_scale(x: f64) -> f64 {
     next_of(&[1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0], x)
 }
 
-/// Minimum of 1, 2, 5 times a power of ten not below `x`; 0 for 0.
+/// Returns the minimum of 1, 2, 5 times a power of ten not below `x`; 0 for 0.
 pub fn round_up(x: f64) -> f64 {
     next_of(&[1.0, 2.0, 5.0, 10.0], x)
 }
 
-/// Minimum of these steps times a power of ten not below `x`; 0 for 0.
+/// Returns the minimum of these steps times a power of ten not below `x`; 0 for 0.
 fn next_of(steps: &[f64], x: f64) -> f64 {
     if !(x > 0.0 && x.is_finite()) {
         return 0.0;

@@ -1,9 +1,10 @@
 //! Runs the rigid and the flexible arm along one motion, logs the samples and computes the figures
 //! at the end.
 //!
-//! `RunLoop::go` steps the arm and its rigid twin, updates `Monitors`, and passes samples to
-//! recorders, curves and observer. `figures` computes the figures from the monitors, `events` the
-//! list of events.
+//! Start at [`Arm::simulate`]. `RunLoop::go` steps the arm and its rigid twin, updates `Monitors`,
+//! and passes samples to recorders, curves and observer. `figures` computes the figures from the
+//! monitors, `events` the list of events. Poses in the world, SI units. Not here: steppers
+//! (`flexarm-stepping`), formats of recordings (`flexarm-log`), the report (`report`).
 
 pub(crate) mod comparison;
 pub(crate) mod headline;
@@ -174,7 +175,7 @@ pub(crate) fn simulate(
     let (mut summary, mut events) = run.summary(arm.robot_caveats().to_vec());
     let end = end.map_err(|error| events::beyond_model(error, &summary.caveats));
     if let Err(error) = &end {
-        events.push(Event { time_s: run.seen.t, kind: EventKind::Stopped, text: error.to_string() });
+        events.push(Event { time_s: run.observed.t, kind: EventKind::Stopped, text: error.to_string() });
     }
     complete(&mut summary, load_caveats, &end, &stopwatch);
     let stress = run.monitors.stress.as_ref();
@@ -309,7 +310,7 @@ struct RunLoop<'a> {
     stepper: Box<dyn Stepper>,
     tcp: Frame,
     twin: RigidTwin,
-    seen: Observation,
+    observed: Observation,
     monitors: Monitors,
     sampler: Sampler,
     sample: Sample,
@@ -321,8 +322,9 @@ struct RunLoop<'a> {
     /// Maximum torque of each motor that moves several joints.
     motors: std::collections::BTreeMap<String, f64>,
     detail: Detail,
-    /// Number of steps between two samples, and in total.
+    /// Number of steps between two samples.
     every: u64,
+    /// Total number of steps.
     last: u64,
 }
 
@@ -355,7 +357,7 @@ impl<'a> RunLoop<'a> {
             arm,
             tcp,
             twin,
-            seen: Observation::new(&plant),
+            observed: Observation::new(&plant),
             monitors: Monitors::new(&plant, arm, n_drives, tool, stress, motion.tool_path.clone()),
             sampler: Sampler::new(robot, arm, frames, places),
             sample: Sample::default(),
@@ -427,35 +429,35 @@ impl<'a> RunLoop<'a> {
     /// Compares with the twin, updates the monitors, and fills the sample to the requested level of
     /// detail.
     fn observe(&mut self, step: u64) {
-        self.stepper.observe(&mut self.seen);
+        self.stepper.observe(&mut self.observed);
         // The twin carries the same payload as the arm.
-        if !Arc::ptr_eq(&self.plant.model, &self.seen.model) {
-            Arc::make_mut(&mut self.plant).model.clone_from(&self.seen.model);
+        if !Arc::ptr_eq(&self.plant.model, &self.observed.model) {
+            Arc::make_mut(&mut self.plant).model.clone_from(&self.observed.model);
         }
         // The torques of the twin are needed only in samples.
         match self.detail {
-            Detail::Figures => self.twin.place(&self.plant, &self.tcp, self.seen.t),
-            _ => self.twin.update(&self.plant, &self.tcp, self.seen.t),
+            Detail::Figures => self.twin.place(&self.plant, &self.tcp, self.observed.t),
+            _ => self.twin.update(&self.plant, &self.tcp, self.observed.t),
         }
         if self.plant.coupling.is_some() {
-            for (motor, torque) in self.robot.motor_torques(&self.plant, self.seen.drive.as_slice()) {
+            for (motor, torque) in self.robot.motor_torques(&self.plant, self.observed.drive.as_slice()) {
                 let peak = self.motors.entry(motor).or_default();
                 *peak = peak.max(torque.abs());
             }
         }
-        let tool = self.monitors.update(&self.seen, &self.twin, &self.plant, &self.tcp);
-        self.at_peak.update(&tool.error, &self.seen, &self.twin);
+        let tool = self.monitors.update(&self.observed, &self.twin, &self.plant, &self.tcp);
+        self.at_peak.update(&tool.error, &self.observed, &self.twin);
         let sample = &mut self.sample;
         sample.error_world = tool.error;
         if self.detail > Detail::Figures {
-            self.sampler.fill(sample, &self.seen, &self.twin, &tool);
-            sampler::fill_elastic(sample, &self.seen, &self.plant);
+            self.sampler.fill(sample, &self.observed, &self.twin, &tool);
+            sampler::fill_elastic(sample, &self.observed, &self.plant);
         }
         let moved = self.monitors.contributions.moved();
         sample.contributions.clear();
         sample.contributions.extend(self.contributors.iter().map(|who| [0, 1, 2].map(|c| moved[who.place][c])));
         if let Some(stress) = &self.monitors.stress {
-            stress.read_gauges(&self.seen, &mut sample.gauges);
+            stress.read_gauges(&self.observed, &mut sample.gauges);
         }
         sample.step = step;
         let (iterations, correction) = self.stepper.last_iteration();

@@ -1,4 +1,7 @@
 //! Checks the input of a run before its first step.
+//!
+//! Start at [`Arm::at_start`]. SI units. Not here: checks of robot file and motion file, which are
+//! made when they are read; caveats before a run (`before`).
 
 use std::sync::Arc;
 
@@ -60,6 +63,10 @@ impl Arm {
 }
 
 /// Checks that a motion respects the joint limits, and that the options are valid for it.
+///
+/// # Errors
+/// [`Error::Limits`] with all violations, unless the options ignore them; [`Error::Value`] for the
+/// first invalid option.
 pub fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
     if !motion.violations.is_empty() && !options.ignore_limits {
         let mut violations: Vec<String> = motion.violations.iter().map(|v| v.warning().message).collect();
@@ -72,6 +79,11 @@ pub fn runnable(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
 }
 
 /// Returns the arm with the loads and payloads of a scenario, and the caveats about them.
+///
+/// * `plant`: the same arm without them.
+///
+/// # Errors
+/// As [`Scenario::acting_on`]; [`Error::Step`] if an inertia with its payload is not valid.
 pub fn loaded(
     robot: &Robot,
     scenario: &Scenario,
@@ -102,6 +114,7 @@ const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
 /// Checks that the options are valid, and that step size and duration give a finite run.
 fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
+    // Each number by itself.
     for (setting, what, x, unit) in [
         (Setting::Step, "step", options.step_s, "s"),
         (Setting::LogRate, "log rate", options.log_rate_hz, "Hz"),
@@ -121,8 +134,9 @@ fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
         );
         return Err(Error::Value(message));
     }
-    let duration = motion.trajectory.duration();
-    let (step_s, duration_s) = (options.step_s, duration);
+
+    // The step against the duration.
+    let (step_s, duration_s) = (options.step_s, motion.trajectory.duration());
     if step_s > duration_s {
         return Err(Error::Value(format!(
             "the step ({} {step_s} s) is longer than the motion ({duration_s} s)",
@@ -148,7 +162,7 @@ const STEPS_PER_LOAD: f64 = 8.0;
 const STEPS_OF_SHORT_LOAD: u32 = 24;
 
 /// Maximum number of kinks at which steps end; a table can have one per row.
-const MAX_BENDS: usize = 100;
+const MAX_KINKS: usize = 100;
 
 /// Adds stops within a load that is too short for the step size to resolve.
 fn stop_within(load: &mut Load, h: f64) {
@@ -156,8 +170,8 @@ fn stop_within(load: &mut Load, h: f64) {
     let lasts = last - first;
     if lasts > 0.0 && lasts < f64::from(STEPS_OF_SHORT_LOAD) * h {
         let inner = (0..=STEPS_OF_SHORT_LOAD).map(|k| first + lasts * f64::from(k) / f64::from(STEPS_OF_SHORT_LOAD));
-        let bends = load.wrench.jumps.iter().copied().take(MAX_BENDS);
-        load.wrench.stops = inner.chain(bends).collect();
+        let kinks = load.wrench.jumps.iter().copied().take(MAX_KINKS);
+        load.wrench.stops = inner.chain(kinks).collect();
     }
 }
 

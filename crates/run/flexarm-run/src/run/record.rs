@@ -1,4 +1,7 @@
 //! Constant parts of a run's recordings: header, meshes, files.
+//!
+//! Start at `recorders` (files and folder) and `header` (contents). Not here: samples (`sampler`),
+//! formats (`flexarm-log`), the report (`report`).
 
 use std::fs::{File, TryLockError};
 use std::path::{Component, Path, PathBuf};
@@ -60,13 +63,9 @@ pub(crate) const STRESS_PICTURE: &str = "stress.png";
 /// Folder for figures for papers, within the output folder.
 pub(crate) const FIGURES_FOLDER: &str = "figures";
 
-/// Returns an error if the folder contains files of an earlier run that may not be replaced.
-pub(crate) fn refuse_to_overwrite(outputs: &Outputs) -> Result<(), Error> {
-    refuse_others(outputs, &[])
-}
-
-/// As [`refuse_to_overwrite`], but ignores files named in `ours`.
-fn refuse_others(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
+/// Returns an error if the folder contains files of an earlier run that may not be replaced;
+/// ignores files named in `ours`.
+pub(crate) fn refuse_to_overwrite(outputs: &Outputs, ours: &[&str]) -> Result<(), Error> {
     let files = files_of_a_run().filter(|file| !ours.contains(file));
     let mut files = files.map(|file| outputs.folder.join(file));
     match files.find(|path| path.exists()).filter(|_| !outputs.overwrite) {
@@ -148,10 +147,12 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     let mut recordings =
         Recordings { set: RecorderSet::new(), names: Files::default(), folders: Undo::default(), lock: None };
     let Some(outputs) = outputs else { return Ok(recordings) };
+
+    // Files of this run, one recorder for each format.
     let mut ours = vec!["report.html", "report.md", "summary.json"];
     ours.extend(outputs.recordings.iter().map(|format| format.info().file_name));
     ours.extend(in_study.then_some(STUDY_FILE));
-    refuse_others(outputs, if in_study { &[STUDY_FILE] } else { &[] })?;
+    refuse_to_overwrite(outputs, if in_study { &[STUDY_FILE] } else { &[] })?;
     let options = CreateOptions::default().with_overwrite(outputs.overwrite);
     let path = |name: &str| outputs.folder.join(name);
     let text = |name: &str| Some(path(name).display().to_string());
@@ -168,6 +169,8 @@ pub(crate) fn recorders(outputs: Option<&Outputs>, in_study: bool) -> Result<Rec
     if outputs.figures {
         recordings.names.figures = text(FIGURES_FOLDER);
     }
+
+    // The folder, which no other run may use meanwhile.
     let unusable = |what: String| Error::File { path: outputs.folder.clone(), what };
     if outputs.folder.exists() && !outputs.folder.is_dir() {
         return Err(unusable(
@@ -307,6 +310,8 @@ fn metadata(
         .iter()
         .map(|f| format!("{}: {}", f.flexible.link, f.flexible.reduced.provenance.method))
         .collect();
+
+    // Paths of the input, as given; settings that are left to the robot file say so.
     let mut inputs = vec![
         ("robot_file", straight(&robot.path)),
         ("urdf_file", straight(&robot.urdf_path)),
@@ -403,6 +408,7 @@ fn located_urdf(robot: &Robot, embed: bool) -> String {
     text
 }
 
+/// Returns a summary of the set-up as Markdown.
 fn description(
     robot: &Robot,
     motion: &Motion,

@@ -1,4 +1,4 @@
-//! Request of a run, and its result.
+//! Request of a run, and its result. Not here: options of the stepper and the log (`RunOptions`).
 
 use std::ops::ControlFlow;
 

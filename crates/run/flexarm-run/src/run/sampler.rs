@@ -1,5 +1,5 @@
 //! Fills the [`Sample`] of a time step for recordings, curves and observers; the same sample is
-//! reused.
+//! reused. Poses of links and stations are in the world; six-vectors linear first.
 
 use flexarm_kinematics::{AxisMotion, Frame, JointMotion};
 use flexarm_log::{ElasticSample, EnergySample, Sample};
@@ -25,35 +25,35 @@ impl Sampler {
     }
 
     /// Fills in the arm and its twin.
-    pub(super) fn fill(&self, sample: &mut Sample, seen: &Observation, twin: &RigidTwin, tool: &ToolError) {
-        sample.time_s = seen.t;
+    pub(super) fn fill(&self, sample: &mut Sample, observed: &Observation, twin: &RigidTwin, tool: &ToolError) {
+        sample.time_s = observed.t;
         sample.error_world = tool.error;
         sample.error_path = tool.path_error;
         sample.static_m = tool.static_m;
-        let [kinetic, potential, elastic] = seen.energy;
+        let [kinetic, potential, elastic] = observed.energy;
         sample.energy = EnergySample { kinetic, potential, elastic };
-        self.fill_flexible(sample, seen, tool);
+        self.fill_flexible(sample, observed, tool);
         self.fill_rigid(sample, twin, tool);
     }
 
-    fn fill_flexible(&self, sample: &mut Sample, seen: &Observation, tool: &ToolError) {
-        let n = seen.drive.len();
+    fn fill_flexible(&self, sample: &mut Sample, observed: &Observation, tool: &ToolError) {
+        let n = observed.drive.len();
         let flexible = &mut sample.flexible;
         flexible.q.clear();
-        flexible.q.extend_from_slice(&seen.q.as_slice()[..n]);
+        flexible.q.extend_from_slice(&observed.q.as_slice()[..n]);
         flexible.qdot.clear();
-        flexible.qdot.extend_from_slice(&seen.qdot.as_slice()[..n]);
+        flexible.qdot.extend_from_slice(&observed.qdot.as_slice()[..n]);
         for &(k, e, weight) in &self.angles {
-            flexible.q[k] += weight * seen.q[e];
-            flexible.qdot[k] += weight * seen.qdot[e];
+            flexible.q[k] += weight * observed.q[e];
+            flexible.qdot[k] += weight * observed.qdot[e];
         }
         flexible.effort.clear();
-        flexible.effort.extend_from_slice(seen.drive.as_slice());
+        flexible.effort.extend_from_slice(observed.drive.as_slice());
         flexible.X_WL.clear();
-        flexible.X_WL.extend(self.link_frames.iter().map(|f| seen.X_WB[f.body] * f.X_BF));
+        flexible.X_WL.extend(self.link_frames.iter().map(|f| observed.X_WB[f.body] * f.X_BF));
         flexible.X_WT = tool.X_flexible;
         flexible.X_WS.clear();
-        flexible.X_WS.extend(self.stations.iter().map(|f| seen.X_WB[f.body] * f.X_BF));
+        flexible.X_WS.extend(self.stations.iter().map(|f| observed.X_WB[f.body] * f.X_BF));
     }
 
     fn fill_rigid(&self, sample: &mut Sample, twin: &RigidTwin, tool: &ToolError) {
@@ -72,11 +72,11 @@ impl Sampler {
 }
 
 /// Fills in deflection and load of each spring, along the axes of its joint.
-pub(super) fn fill_elastic(sample: &mut Sample, seen: &Observation, plant: &Plant) {
+pub(super) fn fill_elastic(sample: &mut Sample, observed: &Observation, plant: &Plant) {
     sample.elastic.resize(plant.elements.len(), ElasticSample::default());
     for (k, element) in plant.elements.iter().enumerate() {
-        let e = seen.q.rows(element.coordinate, element.size);
-        let (mut deflection, mut load) = ([0.0; 6], seen.load[k].into());
+        let e = observed.q.rows(element.coordinate, element.size);
+        let (mut deflection, mut load) = ([0.0; 6], observed.load[k].into());
         match (element.size, plant.model.bodies()[element.body].motion) {
             (1, JointMotion::Axis(motion)) => place(&mut deflection, &mut load, motion, e[0]),
             (n, _) => (0..n.min(6)).for_each(|c| deflection[c] = e[c]),

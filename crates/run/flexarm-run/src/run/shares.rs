@@ -30,13 +30,13 @@ pub(super) struct AtPeak {
 
 impl AtPeak {
     /// Stores the sample if its error is the largest so far; the first of equal ones is kept.
-    pub(super) fn update(&mut self, error: &[f64; 6], seen: &Observation, twin: &RigidTwin) {
+    pub(super) fn update(&mut self, error: &[f64; 6], observed: &Observation, twin: &RigidTwin) {
         let error = Vector3::from_row_slice(&error[..3]);
         if error.norm() > self.size_m {
             (self.size_m, self.error) = (error.norm(), error);
-            self.model = Some(seen.model.clone());
+            self.model = Some(observed.model.clone());
             self.rigid.clone_from(&twin.state.q);
-            self.flexible.clone_from(&seen.q);
+            self.flexible.clone_from(&observed.q);
         }
     }
 

@@ -3,7 +3,8 @@
 //!
 //! The drives are at their commanded positions and the springs in equilibrium with gravity and the
 //! current loads, without inertia forces. The curve is smooth between the times of jumps: it is
-//! computed on a grid and interpolated by cubics.
+//! computed on a grid and interpolated by cubics. World axes, m, s. Not here: the equilibria
+//! (`flexarm_stepping::StaticPath`).
 
 use std::sync::Arc;
 

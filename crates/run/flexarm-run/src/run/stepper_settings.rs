@@ -1,11 +1,12 @@
 //! Stepper settings in a summary: keys and values as given by the stepper's registry entry, so that
-//! the summary does not depend on any stepper.
+//! the summary does not depend on any stepper. Not here: the steppers and their options
+//! (`flexarm-stepping`).
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use flexarm_stepping::{STEPPERS, StepperKind, StepperOptions, StepperSetting};
-use serde::de::{IgnoredAny, MapAccess, Visitor};
-use serde::ser::SerializeMap;
+use serde::de::IgnoredAny;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Settings by key, in the order of the registry. In JSON they are keys of the enclosing object.
@@ -76,18 +77,12 @@ fn known_keys() -> Vec<&'static str> {
 
 impl Serialize for StepperSettings {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.0.len()))?;
-        for (key, value) in &self.0 {
-            map.serialize_entry(key, value)?;
-        }
-        map.end()
+        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
     }
 }
 
 impl<'de> Deserialize<'de> for StepperSettings {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Settings;
-
         /// Values of other types come from files of other versions.
         #[derive(Deserialize)]
         #[serde(untagged)]
@@ -95,27 +90,15 @@ impl<'de> Deserialize<'de> for StepperSettings {
             Value(SettingValue),
             Other(IgnoredAny),
         }
-
-        impl<'de> Visitor<'de> for Settings {
-            type Value = StepperSettings;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("settings of a stepper")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<StepperSettings, A::Error> {
-                let mut settings = Vec::new();
-                while let Some((key, value)) = map.next_entry::<String, MaybeValue>()? {
-                    if let MaybeValue::Value(value) = value {
-                        settings.push((key, value));
-                    }
-                }
-                // A JSON reader may return the keys in another order.
-                let order = known_keys();
-                settings.sort_by_key(|(key, _)| order.iter().position(|known| known == key).unwrap_or(order.len()));
-                Ok(StepperSettings(settings))
-            }
-        }
-        deserializer.deserialize_map(Settings)
+        let own = |(key, value)| match value {
+            MaybeValue::Value(value) => Some((key, value)),
+            MaybeValue::Other(_) => None,
+        };
+        let all = BTreeMap::<String, MaybeValue>::deserialize(deserializer)?;
+        let mut settings: Vec<(String, SettingValue)> = all.into_iter().filter_map(own).collect();
+        // A map has lost the order of the registry.
+        let order = known_keys();
+        settings.sort_by_key(|(key, _)| order.iter().position(|known| known == key).unwrap_or(order.len()));
+        Ok(Self(settings))
     }
 }

@@ -1,5 +1,8 @@
 //! Comparison of several runs: robots, link models, steppers or trajectories side by side, in one
 //! recording and one report.
+//!
+//! Start at [`compare_study`]. Not here: differences between finished runs (`comparison`), the
+//! report (`report`).
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -117,7 +120,7 @@ fn expected_deflections(
     for (number, variant) in variants.iter().enumerate() {
         let Variant { arm, scenario, options, .. } = variant;
         expected = expected.or(arm.expected(scenario, options).map_err(|error| variant.named(error))?);
-        own_outputs(number).as_ref().map_or(Ok(()), refuse_to_overwrite)?;
+        own_outputs(number).map_or(Ok(()), |outputs| refuse_to_overwrite(&outputs, &[]))?;
     }
     Ok(expected)
 }
@@ -125,14 +128,19 @@ fn expected_deflections(
 /// Maximum length of a run's folder name.
 const LONGEST_NAME: usize = 100;
 
-/// Returns the names of the runs' folders: the labels, restricted to characters that every file
-/// system accepts.
+/// Returns the name of a run's folder: its label, restricted to characters that every file system
+/// accepts.
+pub(crate) fn folder_name(label: &str) -> String {
+    label.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' }).collect()
+}
+
+/// Returns the names of the runs' folders, which must be distinct, usable and no files of the
+/// study.
 fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
     let mut taken = BTreeSet::new();
     let mut names = Vec::new();
     for variant in variants {
-        let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.=".contains(c) { c } else { '_' };
-        let name: String = variant.label.chars().map(plain).collect();
+        let name = folder_name(&variant.label);
         if name.is_empty() || name.starts_with('.') || !taken.insert(name.to_lowercase()) {
             let message = format!(
                 "the label {label:?} names two runs of the study, or none: give each {} a name=... of its own",
@@ -164,6 +172,7 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
     Ok(names)
 }
 
+/// Returns the table of the runs as a Markdown page.
 fn study_markdown(summary: &Summary) -> String {
     let robot = flexarm_settings::written::markdown(&summary.robot);
     format!("# Study of {robot}\n\n") + &crate::run::comparison::table(summary)

@@ -1,4 +1,8 @@
-//! Figures of a run; the JSON keys are stable.
+//! Figures of a run: the contents of `summary.json`; the JSON keys are stable.
+//!
+//! Start at [`Summary`]. SI units, world axes; keys end in their units. Not here: their computation
+//! (`figures`, `monitor`, `flexarm_analysis`), sentences about them (`headline`, `settling`,
+//! `report`).
 
 use std::collections::BTreeMap;
 
@@ -126,7 +130,7 @@ pub struct Files {
 pub struct RecordingFiles(BTreeMap<RecordingFormat, String>);
 
 /// Formats with a key in every summary, null if not written; other formats appear only if written.
-const ALWAYS_TOLD: [RecordingFormat; 4] =
+const ALWAYS_LISTED: [RecordingFormat; 4] =
     [RecordingFormat::Mcap, RecordingFormat::Rrd, RecordingFormat::Csv, RecordingFormat::Parquet];
 
 impl RecordingFiles {
@@ -149,7 +153,7 @@ impl RecordingFiles {
 
 impl Serialize for RecordingFiles {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let listed = |format: &RecordingFormat| ALWAYS_TOLD.contains(format) || self.get(*format).is_some();
+        let listed = |format: &RecordingFormat| ALWAYS_LISTED.contains(format) || self.get(*format).is_some();
         let formats = RecordingFormat::ALL.into_iter().filter(listed);
         serializer.collect_map(formats.map(|format| (format.extension(), self.get(format))))
     }
@@ -240,8 +244,9 @@ pub struct LinkStressFigures {
     pub section_forces: Vec<SectionForceFigures>,
 }
 
-/// Extremes of the section forces at a plane across a beam: `N V_y V_z T M_y M_z`, in beam axes about
-/// the axis of the beam (N, N m), of the far side on the near side, so that tension is positive.
+/// Extremes of the section forces at a plane across a beam: `N V_y V_z T M_y M_z`, in beam axes
+/// about the axis of the beam (N, N m), of the far side on the near side, so that tension is
+/// positive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SectionForceFigures {
@@ -295,8 +300,8 @@ pub struct StressPlaceFigures {
     pub of_yield: Option<f64>,
     /// Material with its class; null if it is none of the presets.
     pub material: Option<String>,
-    /// Fatigue damage of the motion if it is repeated without end; the life is 1 over it in motions.
-    /// 1 if the link does not survive the first motion, null for an unknown material.
+    /// Fatigue damage of the motion if it is repeated without end; the life is 1 over it in
+    /// motions. 1 if the link does not survive the first motion, null for an unknown material.
     pub damage: Option<f64>,
 }
 
@@ -509,7 +514,7 @@ impl TcpFigures {
         self
     }
 
-    /// Reason why there is no dominant frequency.
+    /// Returns the reason why there is no dominant frequency.
     pub(crate) fn no_line(&self) -> &'static str {
         /// Errors below this are round-off (m).
         const NOTHING_M: f64 = 1e-9;
@@ -534,46 +539,43 @@ impl TcpFigures {
 }
 
 impl Summary {
-    /// Whether figures about moves and stops are available.
+    /// Returns whether figures about moves and stops are available.
     pub(crate) fn knows_moves(&self) -> bool {
         !self.computed || !self.moves_s.is_empty()
     }
 
-    /// Pairs of label and value for recordings.
+    /// Returns pairs of label and value for recordings; values in SI units.
     pub fn labelled(&self) -> Vec<(String, String)> {
-        let mut rows = vec![
-            ("robot".to_owned(), self.robot.clone()),
-            ("trajectory".into(), self.trajectory.clone()),
-            ("end".into(), self.end.clone()),
-            ("duration_s".into(), self.duration_s.to_string()),
-            ("stepper".into(), format!("{} h = {} s", self.stepper.name, self.stepper.h_s)),
-            ("headline".into(), self.headline.clone()),
-        ];
+        let optional = |x: Option<f64>| x.map_or_else(|| "none".to_owned(), |x| x.to_string());
+        let mut rows = Vec::new();
+        let mut add = |label: &str, value: String| rows.push((label.to_owned(), value));
+        add("robot", self.robot.clone());
+        add("trajectory", self.trajectory.clone());
+        add("end", self.end.clone());
+        add("duration_s", self.duration_s.to_string());
+        add("stepper", format!("{} h = {} s", self.stepper.name, self.stepper.h_s));
+        add("headline", self.headline.clone());
+        // Only with the rigid twin.
         if let Some(tcp) = &self.tcp {
-            let optional = |x: Option<f64>| x.map_or_else(|| "none".to_owned(), |x| x.to_string());
-            rows.extend([
-                ("tcp.peak_m".to_owned(), tcp.peak_m.to_string()),
-                ("tcp.rms_m".into(), tcp.rms_m.to_string()),
-                ("tcp.end_m".into(), tcp.end_m.to_string()),
-                ("tcp.static_sag_m".into(), tcp.static_sag_m.to_string()),
-                ("tcp.static_at_peak_m".into(), optional(tcp.static_at_peak_m)),
-                ("tcp.dynamic_at_peak_m".into(), optional(tcp.dynamic_at_peak_m)),
-                ("tcp.dynamic_peak_m".into(), optional(tcp.dynamic_peak_m)),
-                ("tcp.peak_rad".into(), tcp.peak_rad.to_string()),
-                ("tcp.rms_rad".into(), tcp.rms_rad.to_string()),
-                ("tcp.settling_s".into(), optional(tcp.settling_s)),
-                ("tcp.settling".into(), tcp.settling.clone()),
-                ("tcp.overshoot_m".into(), tcp.overshoot_m.to_string()),
-                ("tcp.dominant_hz".into(), optional(tcp.dominant_hz)),
-            ]);
+            add("tcp.peak_m", tcp.peak_m.to_string());
+            add("tcp.rms_m", tcp.rms_m.to_string());
+            add("tcp.end_m", tcp.end_m.to_string());
+            add("tcp.static_sag_m", tcp.static_sag_m.to_string());
+            add("tcp.static_at_peak_m", optional(tcp.static_at_peak_m));
+            add("tcp.dynamic_at_peak_m", optional(tcp.dynamic_at_peak_m));
+            add("tcp.dynamic_peak_m", optional(tcp.dynamic_peak_m));
+            add("tcp.peak_rad", tcp.peak_rad.to_string());
+            add("tcp.rms_rad", tcp.rms_rad.to_string());
+            add("tcp.settling_s", optional(tcp.settling_s));
+            add("tcp.settling", tcp.settling.clone());
+            add("tcp.overshoot_m", tcp.overshoot_m.to_string());
+            add("tcp.dominant_hz", optional(tcp.dominant_hz));
         }
-        rows.extend(
-            self.links
-                .iter()
-                .map(|l| (format!("link.{}.peak_contribution_m", l.name), l.peak_contribution_m.to_string())),
-        );
+        for link in &self.links {
+            add(&format!("link.{}.peak_contribution_m", link.name), link.peak_contribution_m.to_string());
+        }
         if let Some(f) = self.frequencies_hz.first() {
-            rows.push(("first_frequency_hz".into(), f.to_string()));
+            add("first_frequency_hz", f.to_string());
         }
         rows
     }
@@ -581,14 +583,3 @@ impl Summary {
 
 /// Number of pieces of [`Summary::error_curve`]; fewer if the run has fewer samples.
 pub const CURVE_PIECES: usize = 240;
-
-/// Maximum error in each of [`CURVE_PIECES`] equal pieces of the run (m).
-pub(crate) fn thinned(times: &[f64], errors: &[[f64; 6]]) -> Vec<f64> {
-    let pieces = CURVE_PIECES.min(times.len());
-    (0..pieces)
-        .map(|k| {
-            let range = k * errors.len() / pieces..((k + 1) * errors.len() / pieces).max(k * errors.len() / pieces + 1);
-            errors[range].iter().map(|e| (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]).sqrt()).fold(0.0, f64::max)
-        })
-        .collect()
-}

@@ -1,4 +1,7 @@
 //! The rigid twin: the same robot on the same motion with all elastic coordinates held at zero.
+//!
+//! TCP quantities in world axes at the TCP, SI units. Not here: the distance from the flexible arm
+//! (`monitor::tool`).
 
 use std::sync::Arc;
 

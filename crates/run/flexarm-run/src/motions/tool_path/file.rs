@@ -1,8 +1,8 @@
 //! Path files: TCP moves in TOML, recognised by the table `[path]`.
 //!
 //! Start at [`read_path_file`]. Units become SI here. Frames: W controller's world, B base of the
-//! path, T tool, F flange. Docs: `docs/motions.md`. Not here: tables as written (`tables`), standard
-//! motions (`standard`), planning (`flexarm_path`).
+//! path, T tool, F flange. Docs: `docs/motions.md`. Not here: tables as written (`tables`),
+//! standard motions (`standard`), planning (`flexarm_path`).
 
 use std::path::Path;
 
@@ -400,7 +400,7 @@ impl Reader<'_> {
             return Err(self.source.error(entry.file.span(), message).into());
         }
 
-        // What the program leaves undefined.
+        // Values that the program leaves undefined.
         let R = self.orientation(table, entry.rpy, entry.quaternion)?;
         let mut gcode = GCodeOptions {
             offsets: WORK_FRAMES.iter().map(|code| ((*code).to_owned(), self.X_WB)).collect(),

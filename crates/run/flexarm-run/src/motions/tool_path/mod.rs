@@ -1,8 +1,8 @@
 //! Motions given as TCP paths: a program of moves and a robot become joint trajectories.
 //!
 //! `file` reads flexarm's own path files; robot programs are read elsewhere into a [`Program`].
-//! Both end in `ToolPath::plan`. Frames: W controller's world, M model's world, F flange, T tool; SI
-//! units. Not here: languages (`flexarm-programs`), inverse kinematics and time laws
+//! Both end in `ToolPath::plan`. Frames: W controller's world, M model's world, F flange, T tool;
+//! SI units. Not here: languages (`flexarm-programs`), inverse kinematics and time laws
 //! (`flexarm-path`).
 
 mod file;
@@ -14,7 +14,7 @@ use std::fmt::Display;
 use std::ops::RangeInclusive;
 use std::path::Path;
 
-use flexarm_kinematics::{Frame, Model, Pose};
+use flexarm_kinematics::{Coordinate, Frame, Model, Pose};
 use flexarm_path::program::{Move, Program, Speed};
 use flexarm_path::{
     ControllerAxis, JointBounds, PathOptions, PlannedMove, ProgramArm, Slowed, SlowedBy, coordinates_of, plan,
@@ -118,7 +118,8 @@ impl<'a> Cell<'a> {
         (flange, X_FT, note)
     }
 
-    /// Returns `X_MW`, the pose of the controller's world in the model's: that of the link `base` if it does not move.
+    /// Returns `X_MW`, the pose of the controller's world in the model's: that of the link `base`
+    /// if it does not move.
     fn world(&self) -> Pose {
         let base = self.model.frame(BASE).filter(|frame| frame.body == 0);
         base.map_or_else(Pose::identity, |frame| frame.X_BF)
@@ -127,11 +128,7 @@ impl<'a> Cell<'a> {
     /// Returns the coordinates before the program (rad or m).
     fn rest(&self) -> DVector<f64> {
         let coordinates = self.model.coordinates();
-        DVector::from_fn(self.model.nv(), |k, _| {
-            let c = &coordinates[k];
-            let given = self.hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
-            given.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper))
-        })
+        DVector::from_fn(self.model.nv(), |k, _| held_at(self.hold, &coordinates[k]).0)
     }
 
     /// Returns the controller's convention for these axes; empty if it counts the joints as they
@@ -190,6 +187,13 @@ impl<'a> Cell<'a> {
             ProgramArm { model: self.model, flange, X_FT, X_MW, axes, controller, bounds, rest, starts_at_rest: false };
         (arm, Assumed { flange: flange_note, accelerations, inconsistent })
     }
+}
+
+/// Returns the position at which a joint is held (rad or m), and whether the robot file gives it;
+/// else it is the position within the limits that is closest to zero.
+pub(crate) fn held_at(hold: &[(String, f64)], c: &Coordinate) -> (f64, bool) {
+    let given = hold.iter().find(|(joint, _)| *joint == c.joint).map(|(_, value)| *value);
+    (given.unwrap_or(0.0f64.max(c.limits.lower).min(c.limits.upper)), given.is_some())
 }
 
 impl ToolPath {

@@ -46,8 +46,8 @@ pub enum Step {
 impl Standard {
     /// Returns the steps of `repeats` cycles in a cube, after a joint move to its centre.
     ///
-    /// * `centre`: `p_BoCo_B`, centre of the cube in the base B of the path (m). `side`: its edge, along
-    ///   the axes of B (m).
+    /// * `centre`: `p_BoCo_B`, centre of the cube in the base B of the path (m). `side`: its edge,
+    ///   along the axes of B (m).
     /// * `R`: `R_BT`, orientation of the tool during all steps.
     pub fn steps(self, centre: Vector3<f64>, side: f64, R: Rotation3<f64>, repeats: usize) -> Vec<Step> {
         let pose = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), R);

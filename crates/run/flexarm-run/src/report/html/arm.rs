@@ -1,4 +1,5 @@
-//! The arm at the time of the maximum error, with the key of the pictures.
+//! The arm at the time of the maximum error, with the key of the pictures. Not here: rendering
+//! (`picture`).
 
 use std::fmt::Write as _;
 
@@ -16,6 +17,7 @@ use flexarm_settings::written::markup;
 /// by side.
 const PICTURE_WIDTH: usize = 810;
 
+/// Returns the pictures of each run, or why there are none.
 pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
     let mut out = "<section id=\"arm\" class=\"block\"><h2>The arm at its peak error</h2>\n".to_owned();
     let with_twin: Vec<_> = runs.iter().filter(|run| run.trace.header.has_rigid).collect();
@@ -37,6 +39,7 @@ pub(super) fn arm_pictures(runs: &[ReportRun<'_>]) -> String {
             continue;
         }
         out += "<div class=\"pictures\">\n";
+        // Embedded, so that the page is one file.
         for picture in pictures(run.trace, PICTURE_WIDTH) {
             let caption = format!("{who}{}, at {:.3} s.", picture.title, run.trace.peak.time_s);
             match picture.drawn {

@@ -1,4 +1,5 @@
-//! Data of the plots of the page.
+//! Data of the plots of the page, as JSON. Not here: the curves (`curves`), the plots
+//! (`assets/report.js`).
 
 use flexarm_log::EventKind;
 
@@ -64,6 +65,7 @@ fn json_text(text: &str) -> String {
     json.chars().map(escaped).collect()
 }
 
+/// Returns a plot as JSON; numbers are as short as their accuracy on the screen allows.
 fn json_plot(plot: &Plot) -> String {
     let numbers = |values: &[f64], digits| {
         let mut text = String::with_capacity(8 * values.len());
@@ -73,6 +75,7 @@ fn json_plot(plot: &Plot) -> String {
         }
         text
     };
+    // Views, their tables, and the curves of each.
     let views = plot.views.iter().map(|view| {
         let tables = view.tables.iter().map(|table| {
             let curves = table.curves.iter().map(|curve| {
@@ -95,6 +98,7 @@ fn json_plot(plot: &Plot) -> String {
         let (name, unit) = (json_text(&view.name), json_text(view.y_unit));
         format!("{{\"name\":{name},\"unit\":{unit},\"tables\":[{}]}}", tables.collect::<Vec<_>>().join(","))
     });
+    // Marks, texts and switches of the plot.
     let marks = plot.marks.iter().map(|(x, text)| format!("{{\"x\":{},\"text\":{}}}", short(*x, 6), json_text(text)));
     let texts = [
         ("id", plot.id),

@@ -1,4 +1,5 @@
-//! Figures of a single run as tiles, and of several runs as a table.
+//! Figures of a single run as tiles, and of several runs as a table. Not here: further tables
+//! (`tables`).
 
 use std::fmt::Write as _;
 
@@ -25,6 +26,7 @@ pub(super) fn lies_on_twin(run: &ReportRun<'_>) -> bool {
     run.summary.tcp.as_ref().is_some_and(|tcp| tcp.peak_m < NOTHING_M)
 }
 
+/// Returns the main figures of a run as tiles; the first tile is larger.
 pub(super) fn tiles(run: &ReportRun<'_>) -> String {
     let s = run.summary;
     let band = within(run).unwrap_or_default();
@@ -37,6 +39,7 @@ pub(super) fn tiles(run: &ReportRun<'_>) -> String {
             markup(&note)
         );
     };
+    // Without the rigid twin there is no TCP error: the run itself is described.
     if let Some(tcp) = &s.tcp {
         let mm = |x: f64| fixed(1e3 * x);
         let when = if lies_on_twin(run) { "nothing is flexible".into() } else { format!("at {:.3} s", tcp.t_peak_s) };
@@ -129,11 +132,13 @@ pub(super) fn without_number(s: &Summary, figure: &str) -> String {
 /// Figure that is itself a difference.
 const APART: &str = "apart from the first run";
 
+/// Returns the table that compares runs with the first one.
 pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
     let mut out =
         "<section id=\"summary\" class=\"block\"><h2>Figures side by side</h2><div class=\"scroll\"><table><thead><tr>\
                    <th>figure</th><th>unit</th>"
             .to_owned();
+    // Head: a column per run, in the colour of its curves.
     for (k, run) in runs.iter().enumerate() {
         let color = k % palette::SERIES_LENGTH;
         let label = markup(run.label);
@@ -145,6 +150,7 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
         let cells: String = cells.iter().map(|cell| format!("<td class=\"number\">{}</td>", markup(cell))).collect();
         format!("<tr><th>{name}</th><td>{unit}</td>{cells}</tr>")
     };
+    // Figures with the change from the first run; rows that no run has are left out.
     let one_robot: Vec<bool> = runs.iter().map(|run| of_one_robot(runs[0].trace, run.trace)).collect();
     for (name, unit, value) in COMPARED {
         let values: Vec<Option<f64>> = runs.iter().map(|run| value(run.summary)).collect();
@@ -163,11 +169,13 @@ pub(super) fn comparison(runs: &[ReportRun<'_>]) -> String {
             out += &row(name, unit, values.iter().enumerate().map(cell).collect());
         }
     }
+    // Robot, motion and method of each run.
     let or_none = |text: &str| if text.is_empty() { "–".to_owned() } else { text.to_owned() };
     out += &row("robot", "", runs.iter().map(|run| run.summary.robot.clone()).collect());
     out += &row("trajectory", "", runs.iter().map(|run| or_none(&run.summary.trajectory)).collect());
     out += &row("links", "", runs.iter().map(|run| or_none(&run.summary.links_model)).collect());
     out += &row("stepper", "", runs.iter().map(|run| or_none(&method(run.summary, "").unwrap_or_default())).collect());
+    // Explanation below the table.
     let apart = match runs.iter().any(|run| run.summary.difference.is_some()) {
         true => " Apart: maximum distance of the flexible TCP from that of the first run at the same time.",
         false => "",

@@ -76,6 +76,7 @@ pub fn html(runs: &[ReportRun<'_>]) -> String {
     page
 }
 
+/// Returns everything between heading and data.
 fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str) -> String {
     let mut body: String = runs.iter().map(|run| troubles(run, runs.len() > 1)).collect();
     if let [run] = runs {
@@ -109,6 +110,7 @@ const PLACES: [(&str, &str); 6] = [
     ("Inputs", "inputs"),
 ];
 
+/// Returns title, headlines, facts and navigation.
 fn heading(title: &str, runs: &[ReportRun<'_>], body: &str) -> String {
     let s = runs[0].summary;
     let mut facts = Vec::new();
@@ -161,6 +163,7 @@ fn troubles(run: &ReportRun<'_>, named: bool) -> String {
     out + &warnings(&who, &s.warnings)
 }
 
+/// Returns inputs and settings of a run.
 fn inputs(run: &ReportRun<'_>, named: bool) -> String {
     let (s, header) = (run.summary, &run.trace.header);
     let who = if named { format!(" of {}", markup(run.label)) } else { String::new() };

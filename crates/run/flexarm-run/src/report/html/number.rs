@@ -1,4 +1,6 @@
 //! Number formatting for readers.
+//!
+//! `number` and `fixed` for text, [`short`] for data of plots, of which a page has many thousands.
 
 /// Formats a number with `digits` significant digits, without trailing zeros.
 pub(super) fn number(x: f64, digits: usize) -> String {

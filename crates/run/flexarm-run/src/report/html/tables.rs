@@ -1,4 +1,6 @@
 //! Tables of the page: TCP path, ISO 9283 figures, stops, links, drives and energies.
+//!
+//! Not here: main figures and comparison of runs (`figures`), formatting of numbers (`number`).
 
 use std::fmt::Write as _;
 
@@ -34,6 +36,7 @@ pub(super) fn tool_path(run: &ReportRun<'_>) -> String {
              <figcaption>{caption}</figcaption></figure>"
         );
     }
+    // One row per move, up to a limit.
     let optional = |x: Option<f64>| x.map_or_else(|| "–".into(), |x| number(1e3 * x, 4));
     let row = |of: &PathMoveFigures| {
         vec![
@@ -123,6 +126,7 @@ const ISO: [Iso; 8] = [
     }),
 ];
 
+/// Returns the table of the figures of ISO 9283, one column per run.
 pub(super) fn iso_table(runs: &[ReportRun<'_>]) -> String {
     if runs.iter().all(|run| run.summary.tcp.is_none()) {
         return "<h2 id=\"tables\">Tables</h2>\n".to_owned();
@@ -181,6 +185,7 @@ fn table(title: &str, head: &[&str], rows: &[Vec<String>]) -> String {
     out + "</tbody></table></div></section>\n"
 }
 
+/// Returns the tables of the stops and of the poses with several stops; `of`: end of their titles.
 pub(super) fn stops_table(s: &Summary, of: &str) -> String {
     let Some(tcp) = &s.tcp else { return String::new() };
     let optional = |x: Option<f64>| x.map_or_else(|| "–".into(), |x| number(x, 4));
@@ -200,6 +205,7 @@ pub(super) fn stops_table(s: &Summary, of: &str) -> String {
     let head =
         ["stop", "from (s)", "to (s)", "error at rest (mm)", "settled after (s)", "overshoot (mm)", "rings at (Hz)"];
     let stops = table(&format!("Stops{of}"), &head, &rows);
+    // ISO 9283 figures need several stops at one pose.
     let poses: Vec<Vec<String>> = (tcp.poses.iter().take(MAX_POSES))
         .map(|pose| {
             let place = pose.place_m.map(|x| number(1e3 * x, 5)).join(", ");
@@ -214,6 +220,8 @@ pub(super) fn stops_table(s: &Summary, of: &str) -> String {
     stops + &table(&format!("Poses with several stops{of}"), &head, &poses)
 }
 
+/// Returns the tables of links and drives, drive forces, frequencies and energies; `of`: end of
+/// their titles.
 pub(super) fn parts_tables(s: &Summary, of: &str) -> String {
     let shares = part_shares(s);
     let peak_mm = s.tcp.as_ref().map_or(0.0, |tcp| 1e3 * tcp.peak_m);

@@ -36,24 +36,24 @@ impl Contributions {
         }
     }
 
-    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, plant: &Plant) {
+    pub(crate) fn update(&mut self, observed: &Observation, twin: &RigidTwin, plant: &Plant) {
         self.moved.fill(Vector6::zeros());
         for (element, place) in plant.elements.iter().zip(&self.places) {
             // Column by column: a product of dynamically sized views takes three times as long.
             let mut displacement = Vector6::zeros();
             for k in element.coordinate..element.coordinate + element.size {
-                displacement += twin.J.column(k) * seen.q[k];
+                displacement += twin.J.column(k) * observed.q[k];
             }
             self.moved[*place] += displacement;
         }
         // Following error: motors under servos deviate from the trajectory.
         if let Some(following) = self.moved.last_mut() {
             for &k in &plant.torque_driven {
-                *following += twin.J.column(k) * (seen.q[k] - twin.state.q[k]);
+                *following += twin.J.column(k) * (observed.q[k] - twin.state.q[k]);
             }
         }
         for (peak, displacement) in self.peaks.iter_mut().zip(&self.moved) {
-            peak.update(seen.t, displacement);
+            peak.update(observed.t, displacement);
         }
     }
 

@@ -24,7 +24,7 @@ struct Limits {
 /// Monitors the drives, in the order of the actuated coordinates.
 pub struct DriveLoads {
     limits: Vec<Limits>,
-    seen: Vec<DriveLoad>,
+    loads: Vec<DriveLoad>,
 }
 
 impl DriveLoads {
@@ -36,20 +36,15 @@ impl DriveLoads {
             axes.find(|axis| axis.coordinate == k).map(|axis| axis.limit)
         };
         let limits = actuated.iter().enumerate().map(|(k, c)| Limits { joint: c.limits.effort, servo: servo(k) });
-        Self { limits: limits.collect(), seen: vec![DriveLoad::default(); actuated.len()] }
+        Self { limits: limits.collect(), loads: vec![DriveLoad::default(); actuated.len()] }
     }
 
     /// Adds a sample.
-    pub fn update(&mut self, seen: &Observation) {
-        self.add(seen.t, seen.drive.as_slice());
-    }
-
-    /// Adds the torques or forces of all drives at time `t` (s).
-    fn add(&mut self, t: f64, forces: &[f64]) {
-        for ((load, limits), force) in self.seen.iter_mut().zip(&self.limits).zip(forces) {
+    pub fn update(&mut self, observed: &Observation) {
+        for ((load, limits), force) in self.loads.iter_mut().zip(&self.limits).zip(&observed.drive) {
             load.peak = load.peak.max(force.abs());
             if force.abs() > limits.joint {
-                load.over_since_s.get_or_insert(t);
+                load.over_since_s.get_or_insert(observed.t);
             }
             load.at_limit += usize::from(limits.servo.is_some_and(|limit| force.abs() >= limit));
         }
@@ -57,6 +52,6 @@ impl DriveLoads {
 
     /// Returns one entry per drive.
     pub fn result(&self) -> &[DriveLoad] {
-        &self.seen
+        &self.loads
     }
 }

@@ -1,4 +1,6 @@
 //! Energy balance of a run: work of drives and loads, dissipation, stored energy.
+//!
+//! J, W, s. Not here: energies and powers at an instant (`flexarm_stepping::Observation`).
 
 use std::sync::Arc;
 
@@ -21,17 +23,18 @@ impl Energy {
     }
 
     /// Adds a sample.
-    pub fn update(&mut self, seen: &Observation) {
-        if !Arc::ptr_eq(&self.model, &seen.model) {
+    pub fn update(&mut self, observed: &Observation) {
+        if !Arc::ptr_eq(&self.model, &observed.model) {
             // A payload present at the start is not exchanged.
             if self.book.first.is_some() {
-                self.book.exchanged += mechanical_energy(&seen.model, seen) - mechanical_energy(&self.model, seen);
+                self.book.exchanged +=
+                    mechanical_energy(&observed.model, observed) - mechanical_energy(&self.model, observed);
             }
-            self.model.clone_from(&seen.model);
+            self.model.clone_from(&observed.model);
         }
-        let drives = seen.drive.iter().zip(seen.qdot.iter()).map(|(force, rate)| force * rate);
-        self.book.lose(seen.hysteresis_work);
-        self.book.add(seen.t, seen.energy, seen.power, seen.impulse_work, drives);
+        let drives = observed.drive.iter().zip(observed.qdot.iter()).map(|(force, rate)| force * rate);
+        self.book.lose(observed.hysteresis_work);
+        self.book.add(observed.t, observed.energy, observed.power, observed.impulse_work, drives);
     }
 
     /// Returns the balance so far.
@@ -41,9 +44,9 @@ impl Energy {
 }
 
 /// Kinetic and gravitational energy (J) of a state, including the model's payload.
-fn mechanical_energy(model: &Model, seen: &Observation) -> f64 {
+fn mechanical_energy(model: &Model, observed: &Observation) -> f64 {
     let mut data = Data::new(model);
-    let state = State { q: seen.q.clone(), qdot: seen.qdot.clone() };
+    let state = State { q: observed.q.clone(), qdot: observed.qdot.clone() };
     kinetic_energy(model, &mut data, &state) + potential_energy(model, &mut data, &state.q)
 }
 
@@ -89,6 +92,7 @@ impl EnergyBook {
     /// of the drives at velocity jumps, which is in no power (J); `drives`: power of each drive
     /// (W).
     fn add(&mut self, t: f64, energy: [f64; 3], power: [f64; 3], impulse_work: f64, drives: impl Iterator<Item = f64>) {
+        // Work since the last sample by the trapezoidal rule.
         if let Some((t_before, p)) = self.before {
             for c in 0..3 {
                 self.work[c] += 0.5 * (t - t_before) * (p[c] + power[c]);
@@ -108,6 +112,8 @@ impl EnergyBook {
         self.gross[0] += impulse.max(0.0);
         self.gross[1] += (-impulse).max(0.0);
         self.impulse_work = impulse_work;
+
+        // Balance: stored minus supplied energy.
         self.last = energy.iter().sum();
         self.size = self.size.max(energy.iter().map(|part| part.abs()).sum());
         self.before = Some((t, power));

@@ -46,8 +46,8 @@ pub(crate) struct Monitors {
 }
 
 impl Monitors {
-    /// Creates the monitors of an arm of a robot with `n_drives` drives; those of TCP and stress are
-    /// built separately.
+    /// Creates the monitors of an arm of a robot with `n_drives` drives; those of TCP and stress
+    /// are built separately.
     pub(crate) fn new(
         plant: &Plant,
         arm: &Arm,
@@ -69,18 +69,18 @@ impl Monitors {
     }
 
     /// Passes a sample to all monitors; returns its TCP error.
-    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, plant: &Plant, tcp: &Frame) -> ToolError {
-        self.drive_loads.update(seen);
-        self.contributions.update(seen, twin, plant);
-        self.strains.update(seen.t, &seen.X_WB, &twin.data.X_WB);
-        self.deflections.update(&seen.q);
-        self.energy.update(seen);
+    pub(crate) fn update(&mut self, observed: &Observation, twin: &RigidTwin, plant: &Plant, tcp: &Frame) -> ToolError {
+        self.drive_loads.update(observed);
+        self.contributions.update(observed, twin, plant);
+        self.strains.update(observed.t, &observed.X_WB, &twin.data.X_WB);
+        self.deflections.update(&observed.q);
+        self.energy.update(observed);
         if let Some(stress) = &mut self.stress {
-            stress.update(seen);
+            stress.update(observed);
         }
-        let tool = self.tool.update(seen, twin, tcp);
+        let tool = self.tool.update(observed, twin, tcp);
         if let Some(path) = &mut self.tool_path {
-            path.update(seen.t, &tool, &twin.velocity);
+            path.update(observed.t, &tool, &twin.velocity);
         }
         tool
     }

@@ -31,17 +31,20 @@ pub struct ToolMonitor {
 }
 
 impl ToolMonitor {
-    /// * `path`: axes of the path before the first motion.
+    /// Creates the monitor; `path`: axes of the path before the first motion.
     pub fn new(path: PathFrame, static_part: Option<StaticPart>, record: LongRecord) -> Self {
         Self { path, static_part, record }
     }
 
-    pub(crate) fn update(&mut self, seen: &Observation, twin: &RigidTwin, tcp: &Frame) -> ToolError {
+    /// Adds a sample of the arm and its twin; returns its error.
+    pub(crate) fn update(&mut self, observed: &Observation, twin: &RigidTwin, tcp: &Frame) -> ToolError {
         let X_rigid = twin.data.X_WF(tcp);
-        let X_flexible = seen.X_WB[tcp.body] * tcp.X_BF;
-        self.add(seen.t, X_rigid, X_flexible, &twin.velocity)
+        let X_flexible = observed.X_WB[tcp.body] * tcp.X_BF;
+        self.add(observed.t, X_rigid, X_flexible, &twin.velocity)
     }
 
+    /// Adds a sample; returns its error.
+    ///
     /// * `velocity`: of the rigid TCP (m/s, world axes), which gives the direction of the path.
     pub fn add(&mut self, t: f64, X_rigid: Pose, X_flexible: Pose, velocity: &Vector3<f64>) -> ToolError {
         let error = tcp_error(&X_rigid, &X_flexible);

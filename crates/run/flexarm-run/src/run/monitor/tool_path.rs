@@ -4,6 +4,9 @@
 //! the path; corner overshoot is the TCP motion along the old direction after a corner. A workpiece
 //! is often placed where the TCP actually is; the remaining error is bounded by half the diagonal
 //! of the bounding box of the error vector.
+//!
+//! World axes, SI units. Not here: the plan of the path (`flexarm-path`), the error itself
+//! (`tool`).
 
 use std::sync::Arc;
 
@@ -88,7 +91,7 @@ pub struct ToolPathMonitor {
     high: Vector3<f64>,
     /// Number of samples per stored point.
     every: usize,
-    seen: usize,
+    samples: usize,
     points: Vec<[f64; 6]>,
 }
 
@@ -106,7 +109,7 @@ impl ToolPathMonitor {
             low,
             high,
             every: 1,
-            seen: 0,
+            samples: 0,
             points: Vec::new(),
         }
     }
@@ -148,10 +151,10 @@ impl ToolPathMonitor {
 
     /// Stores every `every`-th point; drops every second one when there are too many.
     fn keep(&mut self, p: Vector3<f64>, e: Vector3<f64>) {
-        if self.seen.is_multiple_of(self.every) {
+        if self.samples.is_multiple_of(self.every) {
             self.points.push([p.x, p.y, p.z, e.x, e.y, e.z]);
         }
-        self.seen += 1;
+        self.samples += 1;
         if self.points.len() >= MAX_POINTS {
             let mut k = 0;
             self.points.retain(|_| {

@@ -1,4 +1,4 @@
-//! Fatigue over the surface of a link.
+//! Fatigue over the surface of a link. Not here: counting of cycles (`flexarm_analysis`).
 
 use flexarm_analysis::{FatigueCycle, rainflow_repeating};
 use nalgebra::DMatrix;
@@ -19,9 +19,9 @@ impl LinkStress {
 
     /// Returns the site of the largest damage; `None` without an S-N curve.
     ///
-    /// Seats are tried in the order of a bound of their damage, until the bound is below the damage
-    /// found. The bound: n samples have n/2 cycles at most, and with the largest stress P of positive
-    /// and Q of negative sign no cycle has a larger amplitude than (P + Q)/2, nor, at this
+    /// Sites are tried in the order of a bound of their damage, until the bound is below the damage
+    /// found. The bound: n samples have n/2 cycles at most, and with the largest stress P of
+    /// positive and Q of negative sign no cycle has a larger amplitude than (P + Q)/2, nor, at this
     /// amplitude, a larger mean than (P - Q)/2; a smaller amplitude with a larger mean is less
     /// harmful.
     pub(super) fn most_damaged(&self, amplitudes: &DMatrix<f32>) -> Option<usize> {

@@ -2,7 +2,9 @@
 //! forces of beams.
 //!
 //! The monitor keeps the amplitudes of the fields at every logged sample; [`StressMonitor::result`]
-//! finds the maxima over the run for every node of the surface.
+//! finds the maxima over the run for every node of the surface. Stress in Pa, components `xx yy zz
+//! xy yz zx` in link axes; L link, W world. Not here: stress fields (`flexarm-fem`), sentences
+//! (`caveat`).
 
 mod equivalent;
 mod fatigue;
@@ -35,7 +37,7 @@ use crate::run::summary::{
 pub use equivalent::signed_von_mises;
 use equivalent::{principal, von_mises_squared};
 
-/// Seats this close to a tied node are left out, as a fraction of the distance between the
+/// Nodes this close to a tied node are left out, as a fraction of the distance between the
 /// interfaces: the stress beside a rigid tie is that of the tie.
 const NEAR_TIE: f64 = 0.05;
 /// Minimum distance between the worst places, as the same fraction.
@@ -93,8 +95,8 @@ impl StressMonitor {
     /// Returns the monitor, or `None` if no link has stress fields.
     ///
     /// # Errors
-    /// [`Error::File`] for a stress file that is damaged or belongs to another link, and for a gauge
-    /// that is not on the surface.
+    /// [`Error::File`] for a stress file that is damaged or belongs to another link, and for a
+    /// gauge that is not on the surface.
     pub(crate) fn new(arm: &Arm, plant: &Plant) -> Result<Option<Self>, Error> {
         let robot = arm.robot();
         let mut links = Vec::new();
@@ -225,8 +227,8 @@ impl StressMonitor {
         self.links.iter().enumerate().filter(|_| !self.times.is_empty()).map(figures).collect()
     }
 
-    /// Returns the surfaces of the links in the world at the instant of the largest stress, coloured by
-    /// the maximum of each node over the run, and labels of the worst places.
+    /// Returns the surfaces of the links in the world at the instant of the largest stress,
+    /// coloured by the maximum of each node over the run, and labels of the worst places.
     pub(crate) fn scenery(&self) -> Vec<Scenery> {
         let links = || self.links.iter().filter(|_| !self.times.is_empty()).map(|link| (link, link.worst()));
         let worst = |(link, worst): &(&LinkStress, Vec<usize>)| worst.first().map_or(0.0, |k| link.peak(*k));
@@ -348,6 +350,7 @@ fn fields_and_map(
     Ok(Some((fields, map.map_err(|error| unusable(path, error))?)))
 }
 
+/// Returns an error about a stress file or a gauge.
 fn unusable(path: &Path, what: impl std::fmt::Display) -> Error {
     Error::Modelling(format!("{}: {what}", path.display()))
 }
@@ -366,6 +369,7 @@ pub(crate) fn without_attached(reduced: &ReducedLink, mut parts: Vec<RigidPart>)
 }
 
 impl LinkStress {
+    /// Returns the amplitudes of all samples, one column each.
     fn amplitudes(&self) -> DMatrix<f32> {
         let columns = self.map.columns();
         DMatrix::from_column_slice(columns, self.amplitudes.len() / columns, &self.amplitudes)
@@ -487,9 +491,9 @@ impl LinkStress {
 
     /// Returns the samples at the corners of a polyline that is close to the amplitudes.
     ///
-    /// The von Mises stress is a convex function of the amplitudes: on a straight line it is nowhere
-    /// larger than at both ends. So the samples in between are not needed to find the worst nodes;
-    /// the stress is off by [`POLYLINE`] at most.
+    /// The von Mises stress is a convex function of the amplitudes: on a straight line it is
+    /// nowhere larger than at both ends. So the samples in between are not needed to find the worst
+    /// nodes; the stress is off by [`POLYLINE`] at most.
     fn corners(&self, amplitudes: &DMatrix<f32>) -> Vec<usize> {
         let stress = self.map.stress();
         // Largest stress per unit of each amplitude: bounds the stress of a difference.
@@ -533,8 +537,8 @@ impl LinkStress {
 
     /// Returns [`LinkStress::sides`] among the corners of a polyline.
     ///
-    /// The sign is that of the trace where the trace exceeds half of the von Mises stress at both ends
-    /// of a piece, and so in between. Other pieces count for both signs.
+    /// The sign is that of the trace where the trace exceeds half of the von Mises stress at both
+    /// ends of a piece, and so in between. Other pieces count for both signs.
     fn sides_of(&self, amplitudes: &DMatrix<f32>) -> Vec<[f32; 2]> {
         let stress = self.map.stress();
         let mut sides = vec![[0.0_f32; 2]; self.fields.sites.len()];
