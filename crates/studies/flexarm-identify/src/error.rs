@@ -1,4 +1,7 @@
-//! Errors of an identification.
+//! Errors of an identification: files, readings without an estimate, mistakes in the readings.
+//!
+//! Mistakes in a file have its path, line and column ([`at_place`]); mistakes that only the arm shows,
+//! such as exchanged joints, are found in `estimation/slips.rs` and put into words by [`of_slip`].
 
 use flexarm_run::{Error, ExternalError, RobotFileError};
 

@@ -224,6 +224,7 @@ fn links(t: &mut String, draft: &Draft, beams: &[&DraftLink]) -> std::fmt::Resul
 /// Writes size and mass of a link, and how far its section can be trusted.
 fn section_notes(t: &mut String, link: &DraftLink, s: &BeamSection) -> std::fmt::Result {
     writeln!(t, "\n# {:.0} mm long, {:.2} kg: a {}.", 1e3 * link.length, link.mass.unwrap_or(0.0), s.words())?;
+    // Why the beam may differ from the link: its ends, its outline, its width, holes in the mesh.
     if s.ends.is_some() {
         writeln!(
             t,
@@ -249,6 +250,7 @@ fn section_notes(t: &mut String, link: &DraftLink, s: &BeamSection) -> std::fmt:
             100.0 * s.open
         )?;
     }
+    // The other bound of the wall: the proposal has all of the mass in it.
     if let Some(half) = s.wall_of_half {
         writeln!(
             t,
