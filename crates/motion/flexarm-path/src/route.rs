@@ -372,10 +372,7 @@ fn joint_jet(way: &LegPath, length: f64, s: f64) -> JointJet {
 
 /// The slower of two speeds for each quantity.
 fn slower(a: &Speed, b: &Speed) -> Speed {
-    let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
-        (Some(a), Some(b)) => Some(a.min(b)),
-        (a, b) => a.or(b),
-    };
+    let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     Speed {
         linear_m_s: least(a.linear_m_s, b.linear_m_s),
         linear_m_s2: least(a.linear_m_s2, b.linear_m_s2),

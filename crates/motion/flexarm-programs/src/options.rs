@@ -93,21 +93,6 @@ impl Default for ReadOptions<'_> {
     }
 }
 
-impl std::fmt::Debug for ReadOptions<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("ReadOptions")
-            .field("language", &self.language)
-            .field("entry", &self.entry)
-            .field("start", &self.start)
-            .field("given", &self.given)
-            .field("companions", &self.companions.iter().map(|(path, _)| path).collect::<Vec<_>>())
-            .field("endless_passes", &self.endless_passes)
-            .field("forward", &self.forward.is_some())
-            .field("gcode", &self.gcode)
-            .finish_non_exhaustive()
-    }
-}
-
 /// Interpretation of rotary words in G-code.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
@@ -133,9 +118,6 @@ pub struct GCodeOptions {
     pub offsets: Vec<(String, Pose)>,
     /// Frame of the machine coordinates (G53) in the controller's world.
     pub machine: Pose,
-    /// Position of the tool in the work frame at the start, mm; coordinates given neither here nor
-    /// in the first move are 0, with a note.
-    pub start_mm: Option<[f64; 3]>,
     /// Target of G28 in machine coordinates, mm; `None`: G28 is rejected. G30 likewise.
     pub reference_mm: Option<[f64; 3]>,
     /// Speed of rapids (G0) as straight lines, m/s; `None`: they are joint moves.
@@ -143,10 +125,6 @@ pub struct GCodeOptions {
     /// Whether the tool centre point is the tip of the tool, so that G43 with a tool length has no
     /// effect. `false`: G43 is rejected.
     pub tip_is_known: bool,
-    /// Whether `P` of G4 is in milliseconds instead of seconds.
-    pub dwell_in_ms: bool,
-    /// Maximum distance of the arcs that replace a helix from it, m.
-    pub helix_error_m: f64,
 }
 
 impl Default for GCodeOptions {
@@ -156,12 +134,9 @@ impl Default for GCodeOptions {
             rotary: Rotary::Refused,
             offsets: Vec::new(),
             machine: Pose::identity(),
-            start_mm: None,
             reference_mm: None,
             rapid_m_s: None,
             tip_is_known: false,
-            dwell_in_ms: false,
-            helix_error_m: 1e-6,
         }
     }
 }

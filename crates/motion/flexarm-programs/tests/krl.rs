@@ -39,7 +39,7 @@ fn inline_forms_of_a_pendant_take_speed_frames_and_blends_from_the_data_list() {
     assert_eq!(lin.blend, Blend::Stop);
     assert!(matches!(&program.items[3], Item::Dwell { place, seconds: 0.5 } if place.line == Some(31)));
     let outputs = program.notes.iter().find(|note| note.message.starts_with("inputs and outputs")).unwrap();
-    assert!(outputs.location.ends_with(":30"), "{outputs}");
+    assert!(outputs.location.ends_with(":30:1"), "{outputs}");
 }
 
 #[test]

@@ -44,6 +44,22 @@ fn targets_tools_and_work_objects_are_poses_of_their_quaternions() {
     assert_pose(&pose(moves[7]), &at_mm(600.0, 0.0, 712.0, euler_product(90.0, 0.0, 0.0)));
 }
 
+/// Truth: lines and columns counted by hand; the text before the third statement has a letter of two
+/// bytes, and the loop runs every statement five times.
+#[test]
+fn a_note_names_each_of_its_places_once_also_in_a_loop_and_counts_columns_in_letters() {
+    let start = "MoveAbsJ [[0,0,0,0,30,0],[9E9,9E9,9E9,9E9,9E9,9E9]],v100,fine,tool0;";
+    let outputs = "SetDO a,1;\n".repeat(8);
+    let text = format!(
+        "MODULE m\nPROC main()\n{start}\nFOR i FROM 1 TO 5 DO\n  SetDO a,1; TPWrite \"ü\"; SetDO b,1;\n{outputs}ENDFOR\nENDPROC\nENDMODULE\n"
+    );
+    let program = read_text("m.mod", &text, &ReadOptions::default()).unwrap();
+    let note = program.notes.iter().find(|note| note.message.starts_with("outputs")).unwrap().to_string();
+    let note = note.replace("/nowhere/", "");
+    let truth = "m.mod:5:3: outputs are not simulated (also at m.mod:5:27, m.mod:6:1, m.mod:7:1 and 6 more)";
+    assert_eq!(note, truth);
+}
+
 #[test]
 fn speeds_zones_and_times_are_those_of_their_data_and_switches() {
     let program = read("cell.mod", &ReadOptions::default());

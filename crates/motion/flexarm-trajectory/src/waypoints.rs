@@ -85,13 +85,13 @@ impl Trajectory {
         }
         let file: FileToml = toml::Deserializer::parse(text).and_then(exact).map_err(unread)?;
 
-        let Checked { plan, odd_limit, move_offsets } =
+        let Checked { plan, unusual_limit, move_offsets } =
             check(&file, limits).map_err(|error| fail(error.offset, error.fault))?;
         let planned = plan.build().map_err(|error| {
             let number = if let TrajectoryError::Plan(error) = &error { error.move_number() } else { None };
             fail(number.and_then(|number| move_offsets.get(number - 1).copied()), error.into())
         })?;
-        let planned = odd_limit.into_iter().fold(planned, Self::with_note);
+        let planned = unusual_limit.into_iter().fold(planned, Self::with_note);
         Ok(planned.with_stated_units(stated_units(&file.unit, &file.metres, &file.joints, line)))
     }
 }

@@ -30,7 +30,7 @@ pub(crate) struct Located {
 /// The plan, a limit that does not suit the others, and the offset of each move in the text.
 pub(crate) struct Checked {
     pub(crate) plan: Plan,
-    pub(crate) odd_limit: Option<Finding>,
+    pub(crate) unusual_limit: Option<Finding>,
     pub(crate) move_offsets: Vec<usize>,
 }
 
@@ -66,10 +66,10 @@ pub(crate) fn check(file: &FileToml, known: &[(&str, JointLimits)]) -> Result<Ch
         let own = known.iter().find(|(name, _)| name == joint).map_or(f64::INFINITY, |(_, robot)| robot.velocity);
         MotionLimits { velocity: full.velocity, ..*limits }.unusual(joint, own)
     };
-    let odd_limit = moves.iter().find_map(|planned: &PlannedMove| {
+    let unusual_limit = moves.iter().find_map(|planned: &PlannedMove| {
         planned.limits.iter().zip(robot_limits.iter().zip(&context.joints)).find_map(of_joint)
     });
-    Ok(Checked { plan: Plan { joints: context.joints, start, moves }, odd_limit, move_offsets })
+    Ok(Checked { plan: Plan { joints: context.joints, start, moves }, unusual_limit, move_offsets })
 }
 
 pub(crate) fn joint_names(joints: &Spanned<Vec<Spanned<String>>>) -> Result<Vec<String>, Located> {

@@ -217,6 +217,19 @@ fn a_gap_in_evenly_sampled_rows_is_told_with_its_place_and_length() {
     assert!(slow.iter().any(|w| w.to_string().contains("from t = 4.0000 s to 4.8400 s")), "{slow:?}");
 }
 
+/// Truth: 0.25 s at 10 Hz are the times 0, 0.1, 0.2 and the end; at 20 Hz the end is a regular time.
+#[test]
+fn written_rows_are_evenly_spaced_and_the_last_one_is_at_the_end() {
+    let motion = parse("# unit: rad\ntime,q\n0,0\n0.25,1\n");
+    let times = |rate| motion.row_times(rate, 6).unwrap().collect::<Vec<f64>>();
+    assert_eq!(times(10.0), [0.0, 0.1, 0.2, 0.25]);
+    assert_eq!(times(20.0), [0.0, 0.05, 0.1, 3.0 / 20.0, 0.2, 0.25]);
+    for rate in [0.0, -1.0, f64::NAN, f64::INFINITY, 25.0] {
+        let error = motion.row_times(rate, 6).map(|_| ()).unwrap_err().to_string();
+        assert!(error.contains(&format!("{rate} Hz")) && error.contains("at most 6 rows"), "{error}");
+    }
+}
+
 #[test]
 fn rows_that_repeat_the_one_before_are_left_out_and_counted() {
     let motion = parse("# unit: rad\ntime,q\n0,0\n1,0\n1,0\n1,0\n2,1\n3,1\n");

@@ -33,6 +33,9 @@ impl Plane {
     }
 }
 
+/// Maximum distance of the arcs that replace a helix from it, m.
+const HELIX_ERROR: f64 = 1e-6;
+
 /// Arc of a circle, optionally with a rise along its axis.
 #[derive(Debug, Clone, Copy)]
 struct Helix {
@@ -198,12 +201,11 @@ impl Gcode<'_> {
     /// Adds the moves of an arc: one if it is flat and less than a full circle, otherwise several
     /// without a stop.
     fn pieces(&mut self, helix: &Helix, goal: Vector3<f64>, speed: Speed, span: Span) -> Result<()> {
-        let error = self.recorder.options.gcode.helix_error_m.max(1e-9);
         let mut count = (helix.angle.abs() / if helix.rise == 0.0 { 1.75 * PI } else { PI / 2.0 }).ceil().max(1.0);
-        while helix.rise != 0.0 && helix.distance_of_piece(0.0, 1.0 / count) > error {
+        while helix.rise != 0.0 && helix.distance_of_piece(0.0, 1.0 / count) > HELIX_ERROR {
             count *= 2.0;
             if count > 1e6 {
-                return fail(span, "this helix cannot be made of arcs within the allowed error (`helix_error_m`)");
+                return fail(span, "this helix cannot be made of arcs within 1e-6 m: is its rise right?");
             }
         }
         let end_blend = self.blend;

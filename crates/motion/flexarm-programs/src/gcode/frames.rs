@@ -24,7 +24,7 @@ impl Gcode<'_> {
         let before = self.frame(self.work_frame);
         self.work_frame = code;
         let now = self.frame(code);
-        if !self.has_moved && self.recorder.options.gcode.start_mm.is_none() {
+        if !self.has_moved {
             if self.recorder.options.start.is_some() {
                 self.at = [None; 3]; // set again in the new frame by `place_at_start`
             }

@@ -124,7 +124,6 @@ pub(crate) fn read(texts: &mut [Text], options: &ReadOptions<'_>) -> Result<Reco
 
 impl<'a> Gcode<'a> {
     fn new(recorder: Recorder<'a>) -> Self {
-        let start = recorder.options.gcode.start_mm;
         Self {
             recorder,
             motion: None,
@@ -138,7 +137,7 @@ impl<'a> Gcode<'a> {
             work_frame: 540,
             blend: Blend::Pass,
             blend_is_told: false,
-            at: start.map_or([None; 3], |start| start.map(|value| Some(value * 1e-3))),
+            at: [None; 3],
             rotary: [0.0; 3],
             offset: Vector3::zeros(),
             moved_frames: HashMap::new(),
@@ -279,10 +278,8 @@ impl<'a> Gcode<'a> {
     fn dwell(&mut self, values: &HashMap<char, (f64, Span)>, span: Span) -> Result<()> {
         let seconds = match (values.get(&'P'), values.get(&'S').or(values.get(&'X')).or(values.get(&'U'))) {
             (Some((value, _)), _) => {
-                let in_ms = self.recorder.options.gcode.dwell_in_ms;
-                self.recorder
-                    .note(if in_ms { "P of G4 is in milliseconds" } else { "P of G4 is in seconds (RS274)" }, span);
-                if in_ms { value * 1e-3 } else { *value }
+                self.recorder.note("P of G4 is in seconds (RS274)", span);
+                *value
             }
             (None, Some((value, _))) => *value,
             (None, None) => return fail(span, "G4 needs its time: P in seconds"),

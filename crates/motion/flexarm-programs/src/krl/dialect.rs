@@ -12,7 +12,7 @@ use super::{motion, parse};
 use crate::common::frames::{mm_deg_zyx, pose_zyx_mm_deg};
 use crate::common::machine::{Dialect, Flow};
 use crate::common::tree::{Argument, Operator, Statement};
-use crate::common::value::{Record, Value, depends};
+use crate::common::value::{Record, Value};
 use crate::common::{Result, Span, fail, is_among};
 
 /// System variables that have no effect on the motion of the arm.
@@ -74,7 +74,10 @@ impl Dialect for Krl {
                 let seconds = machine.number(arguments, 0, span)?;
                 machine.recorder.dwell(seconds.max(0.0), span)?;
             }
-            "wait for" => wait_for(machine, arguments, span)?,
+            "wait for" => {
+                let (condition, at) = machine.argument(arguments, 0, span)?;
+                machine.wait_for(condition, at, span)?;
+            }
             _ if Self::is_still(name) => machine.recorder.note(still_words(name), span),
             _ => {
                 return fail(
@@ -179,23 +182,4 @@ fn frame_product(left: &Value, right: &Value, span: Span) -> Result<Value> {
         }
     }
     Ok(Value::Record(Rc::new(result)))
-}
-
-fn wait_for(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<()> {
-    let (value, at) = machine.argument(arguments, 0, span)?;
-    match value {
-        Value::Flag(true) => Ok(()),
-        _ if machine.recorder.options.waits_are_over => {
-            machine.recorder.note("waiting for the outside is taken as over at once", span);
-            machine.recorder.stop();
-            Ok(())
-        }
-        Value::Flag(false) => {
-            fail(span, "this condition never becomes true, so the program waits for ever: take the line out")
-        }
-        Value::Outside(what) => {
-            fail(span, format!("{}; or let waiting be over at once (`waits_are_over`)", depends(&what)))
-        }
-        other => fail(at, format!("a truth value is expected, this is {}", other.kind())),
-    }
 }

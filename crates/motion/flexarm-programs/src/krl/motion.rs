@@ -465,10 +465,7 @@ fn joint_speed(machine: &Krls<'_>, span: Span) -> Result<Speed> {
 
 fn path_speed(machine: &mut Krls<'_>, span: Span) -> Result<Speed> {
     let part = overriding(machine, span)?;
-    let smaller = |a: Option<f64>, b: Option<f64>| match (a, b) {
-        (Some(a), Some(b)) => Some(a.min(b)),
-        (a, b) => a.or(b),
-    };
+    let smaller = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     let linear = setting(machine, "$vel", "cp", span)?;
     if linear.is_none() {
         machine.recorder.note("no path speed ($VEL.CP) is set: the robot's limits rule", span);

@@ -284,16 +284,15 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Vec<Action>> {
     }
     match word {
         "ext" | "extfct" | "extfctp" | "extp" | "import" | "struc" | "enum" | "signal" => none(parser),
-        "global" if parser.word_ahead(1).is_some_and(|word| ["struc", "enum", "signal"].contains(&&*word)) => {
-            none(parser)
-        }
-        "interrupt" => still(parser, "interrupts are not simulated: none comes"),
-        "global" if parser.word_ahead(1).as_deref() == Some("interrupt") => {
+        "interrupt" | "global" if word == "interrupt" || parser.word_ahead(1).as_deref() == Some("interrupt") => {
             still(parser, "interrupts are not simulated: none comes")
         }
         "decl" | "global" | "const" => declaration(parser),
         _ if TYPES.contains(&word) && parser.word_ahead(1).is_some() => declaration(parser),
-        "exit" => Ok(vec![take(parser, Action::Leave)]),
+        "exit" => {
+            parser.advance();
+            Ok(vec![Action::Leave])
+        }
         "return" => {
             parser.advance();
             let value = if *parser.peek() == Token::Line { None } else { Some(parser.expression()?) };
@@ -320,11 +319,6 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Vec<Action>> {
         _ if parser.word().is_some() && parser.is_symbol_ahead(1, ":") => none(parser), // a label
         _ => refuse(parser, "this statement of KRL is not known here: take it out if it does not move the robot"),
     }
-}
-
-fn take(parser: &mut Parser, action: Action) -> Action {
-    parser.advance();
-    action
 }
 
 fn refuse(parser: &mut Parser, message: &str) -> Result<Vec<Action>> {

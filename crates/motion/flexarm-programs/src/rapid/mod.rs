@@ -15,8 +15,8 @@ use std::rc::Rc;
 
 use crate::common::machine::{Dialect, Flow, Machine};
 use crate::common::recorder::{Recorded, Recorder};
-use crate::common::tree::{Argument, Operator, Statement};
-use crate::common::value::{Value, depends};
+use crate::common::tree::{Argument, Operator};
+use crate::common::value::Value;
 use crate::common::{Result, Span, Text, fail, is_among};
 use crate::{ReadOptions, decode, given_text};
 
@@ -153,7 +153,10 @@ impl Dialect for Rapid {
             }
             "waituntil" | "waitdi" | "waitdo" | "waitgi" | "waitgo" | "waitai" | "waitao" | "waitsynctask"
             | "waittestandset" => {
-                wait(machine, name, arguments, span)?;
+                let unknown = || Ok((Value::Outside(format!("`{name}`").into()), span));
+                let (condition, at) =
+                    if name == "waituntil" { machine.argument(arguments, 0, span) } else { unknown() }?;
+                machine.wait_for(condition, at, span)?;
             }
             "waitrob" => machine.recorder.stop(),
             "stop" | "break" => {
@@ -181,14 +184,6 @@ impl Dialect for Rapid {
             }
         }
         Ok(Flow::On)
-    }
-
-    fn block(_: &mut Rapids<'_>, _: &str, _: &[Argument], _: &[Statement], span: Span) -> Result<Flow> {
-        fail(span, "this block is not known")
-    }
-
-    fn undeclared(_: &mut Rapids<'_>, _: &str, _: Span) -> Result<bool> {
-        Ok(true)
     }
 
     fn coerce(machine: &mut Rapids<'_>, kind: &str, value: Value, span: Span) -> Result<Value> {
@@ -220,27 +215,6 @@ fn still_words(name: &str) -> &'static str {
         "triggio" | "triggequip" | "triggint" => "switching on the path is not simulated",
         "actunit" | "deactunit" => "mechanical units beside the robot are not simulated",
         _ => "messages, files, clocks and monitoring are not simulated",
-    }
-}
-
-/// Handles waiting for external events; a condition known to be true ends at once.
-fn wait(machine: &mut Rapids<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<()> {
-    let known = if name == "waituntil" {
-        machine.argument(arguments, 0, span)?.0
-    } else {
-        Value::Outside(format!("`{name}`").into())
-    };
-    match known {
-        Value::Flag(true) => Ok(()),
-        _ if machine.recorder.options.waits_are_over => {
-            machine.recorder.note("waiting for the outside is taken as over at once", span);
-            machine.recorder.stop();
-            Ok(())
-        }
-        Value::Outside(what) => {
-            fail(span, format!("{}; or let waiting be over at once (`waits_are_over`)", depends(&what)))
-        }
-        _ => fail(span, "this condition never becomes true, so the program waits for ever: take the line out"),
     }
 }
 

@@ -349,25 +349,18 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
             parser.advance();
             return Ok(Action::Halt);
         }
-        "goto" => {
-            return skipped(parser, Action::Refused("jumps (GOTO) are not read: write a loop or a branch".into()));
-        }
+        "goto" => return refuse(parser, "jumps (GOTO) are not read: write a loop or a branch"),
         "raise" | "retry" | "trynext" => {
-            return skipped(
-                parser,
-                Action::Refused("errors and their handlers are not simulated: take the statement out".into()),
-            );
+            return refuse(parser, "errors and their handlers are not simulated: take the statement out");
         }
         "connect" => {
-            return skipped(parser, Action::Still("interrupts are not simulated: none comes"));
+            parser.skip_to(&Token::Symbol(";"));
+            return Ok(Action::Still("interrupts are not simulated: none comes"));
         }
         _ => {}
     }
     if parser.is_symbol("%") {
-        return skipped(
-            parser,
-            Action::Refused("calls by a text (%...%) are not read: write the name of the routine".into()),
-        );
+        return refuse(parser, "calls by a text (%...%) are not read: write the name of the routine");
     }
     if parser.word().is_some() && parser.is_symbol_ahead(1, ":") {
         // A label is skipped; the statement after it is parsed.
@@ -385,9 +378,9 @@ fn simple(parser: &mut Parser, word: &str) -> Result<Action> {
     call(parser)
 }
 
-fn skipped(parser: &mut Parser, action: Action) -> Result<Action> {
+fn refuse(parser: &mut Parser, message: &str) -> Result<Action> {
     parser.skip_to(&Token::Symbol(";"));
-    Ok(action)
+    Ok(Action::Refused(message.into()))
 }
 
 /// Parses `Name a, b \C:=d;`.

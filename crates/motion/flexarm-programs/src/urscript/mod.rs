@@ -18,7 +18,7 @@ use flexarm_spatial::Pose;
 use crate::common::frames::{Circle, pose_rotation_vector, rotation_vector_of};
 use crate::common::machine::{Dialect, Flow, Machine, positional};
 use crate::common::recorder::{Recorded, Recorder};
-use crate::common::tree::{Argument, Operator, Statement};
+use crate::common::tree::{Argument, Operator};
 use crate::common::value::{Value, depends};
 use crate::common::{Result, Span, Text, fail, is_among};
 use crate::{ReadOptions, decode, given_text};
@@ -130,18 +130,6 @@ impl Dialect for UrScript {
             }
         }
         Ok(Flow::On)
-    }
-
-    fn block(_: &mut UrScripts<'_>, _: &str, _: &[Argument], _: &[Statement], span: Span) -> Result<Flow> {
-        fail(span, "this block is not known")
-    }
-
-    fn undeclared(_: &mut UrScripts<'_>, _: &str, _: Span) -> Result<bool> {
-        Ok(true)
-    }
-
-    fn coerce(_: &mut UrScripts<'_>, _: &str, value: Value, _: Span) -> Result<Value> {
-        Ok(value)
     }
 
     fn binary(operator: Operator, left: &Value, right: &Value, span: Span) -> Option<Result<Value>> {

@@ -111,6 +111,25 @@ impl<D: Dialect> Machine<'_, D> {
         }
     }
 
+    /// Waits for a condition: one that is true ends at once, any other does with an option.
+    pub(crate) fn wait_for(&mut self, condition: Value, at: Span, span: Span) -> Result<()> {
+        match condition {
+            Value::Flag(true) => Ok(()),
+            _ if self.recorder.options.waits_are_over => {
+                self.recorder.note("waiting for the outside is taken as over at once", span);
+                self.recorder.stop();
+                Ok(())
+            }
+            Value::Flag(false) => {
+                fail(span, "this condition never becomes true, so the program waits for ever: take the line out")
+            }
+            Value::Outside(what) => {
+                fail(span, format!("{}; or let waiting be over at once (`waits_are_over`)", depends(&what)))
+            }
+            other => fail(at, format!("a truth value is expected, this is {}", other.kind())),
+        }
+    }
+
     fn check_endless(&self, span: Span) -> Result<()> {
         match self.recorder.options.endless_passes {
             Some(_) => Ok(()),

@@ -35,21 +35,21 @@ pub(crate) trait Dialect: Sized {
     /// Runs an instruction that is not a routine of the file.
     fn instruction(machine: &mut Machine<Self>, name: &str, arguments: &[Argument], span: Span) -> Result<Flow>;
 
-    /// Runs a block of statements with a keyword.
-    fn block(
-        machine: &mut Machine<Self>,
-        name: &str,
-        arguments: &[Argument],
-        body: &[Statement],
-        span: Span,
-    ) -> Result<Flow>;
+    /// Runs a block of statements with a keyword; by default there is none.
+    fn block(_: &mut Machine<Self>, _: &str, _: &[Argument], _: &[Statement], span: Span) -> Result<Flow> {
+        fail(span, "this block is not known")
+    }
 
     /// Whether an undeclared variable may be assigned; may add a note. `false`: the assignment has
     /// no effect.
-    fn undeclared(machine: &mut Machine<Self>, name: &str, span: Span) -> Result<bool>;
+    fn undeclared(_: &mut Machine<Self>, _: &str, _: Span) -> Result<bool> {
+        Ok(true)
+    }
 
     /// Converts a value to the type of a variable or parameter.
-    fn coerce(machine: &mut Machine<Self>, kind: &str, value: Value, span: Span) -> Result<Value>;
+    fn coerce(_: &mut Machine<Self>, _: &str, value: Value, _: Span) -> Result<Value> {
+        Ok(value)
+    }
 
     /// Applies an operator to values of the language's own types; `None` if it does not apply.
     fn binary(operator: Operator, left: &Value, right: &Value, span: Span) -> Option<Result<Value>>;
