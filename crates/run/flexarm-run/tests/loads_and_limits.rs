@@ -24,7 +24,7 @@ fn an_effort_beyond_its_limit_is_a_violation_with_the_sentence_of_all_limits() {
     let violation = of_effort("joint_1", &worst, 0.4, 10.0).unwrap();
     let reported = MotionViolation::from(&violation);
     assert_eq!((reported.kind, reported.value, reported.since_s, reported.limit), ("effort", -12.0, 0.4, 10.0));
-    assert_eq!(reported.message, violation.to_string());
+    assert_eq!(reported.message, violation.warning().message);
     assert!(reported.message.contains("effort exceeds its limit 10.0000: -12.0000 at t = 0.5000 s"));
     for limit in [12.0, f64::INFINITY, f64::NAN] {
         assert_eq!(of_effort("joint_1", &worst, 0.4, limit), None, "{limit}");
