@@ -468,70 +468,70 @@ fn refusal(result: Result<MessageMotion, MotionError>) -> String {
 }
 
 #[test]
-fn what_is_wrong_with_a_text_is_told_with_its_line() {
+fn what_is_wrong_with_a_text_is_told_with_its_line_and_column() {
     let points = "joint_names: [joint_1, joint_2]\npoints:\n";
     let cases = [
         ("a: [1, 2]\nb: [3, 4", "t:3:1: the text is neither YAML nor JSON:"),
         ("a: 1\nb: 2\n", "t: there is no motion in the text: expected a JointTrajectory (`joint_names` and `points`)"),
         (
             &format!("{points}- positions: [0.0]\n  time_from_start: 0.0\n"),
-            "t:3: `positions` has 1 values for 2 joints; expected one for each name",
+            "t:3:3: `positions` has 1 values for 2 joints; expected one for each name",
         ),
         (
             &format!(
                 "{points}- {{positions: [0, 0], time_from_start: 0.0}}\n- {{positions: [0, 1, 2], time_from_start: 1.0}}\n"
             ),
-            "t:4: `positions` has 3 values for 2 joints; expected one for each name (point 2)",
+            "t:4:3: `positions` has 3 values for 2 joints; expected one for each name (point 2)",
         ),
         (
             "name: [joint_1]\nposition: [0.0, 1.0]\n",
-            "t:1: `position` has 2 values for 1 joints; expected one for each name",
+            "t:1:1: `position` has 2 values for 1 joints; expected one for each name",
         ),
         (
             &format!("{points}- positions: []\n  velocities: [1, 1]\n  time_from_start: 0.0\n"),
-            "t:3: `positions` has 0 values for 2 joints; expected one for each name: a trajectory without positions",
+            "t:3:3: `positions` has 0 values for 2 joints; expected one for each name: a trajectory without positions",
         ),
         (
             &format!("{points}- positions: [0, 0]\n"),
-            "t:3: point 1 has no `time_from_start`; expected sec and nanosec, or seconds",
+            "t:3:3: point 1 has no `time_from_start`; expected sec and nanosec, or seconds",
         ),
         (
             &format!(
                 "{points}- {{positions: [0, 0], time_from_start: 1.0}}\n- {{positions: [1, 1], time_from_start: 1.0}}\n"
             ),
-            "t:4: point 2 is at 1 s, the one before it at 1 s: `time_from_start` must increase",
+            "t:4:3: point 2 is at 1 s, the one before it at 1 s: `time_from_start` must increase",
         ),
         (
             &format!("{points}- {{positions: [0, .nan], time_from_start: 1.0}}\n"),
-            "t:3: joint \"joint_2\", point 1: the position is NaN; expected a finite number",
+            "t:3:3: joint \"joint_2\", point 1: the position is NaN; expected a finite number",
         ),
         (
             &format!("{points}- {{positions: [0, 0, '...'], time_from_start: 1.0}}\n"),
-            "t:3: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)",
+            "t:3:22: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)",
         ),
         (
             &format!("{points}- {{positions: [0, 0], time_from_start: 0.0}}\n- '...'\n"),
-            "t:4: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length,",
+            "t:4:3: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length,",
         ),
         (
             "joint_names: [joint_1, '...']\npoints: []\n",
-            "t:1: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length,",
+            "t:1:24: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length,",
         ),
         (
             "joint_names: [joint_1]\npoints: '<sequence type: trajectory_msgs/msg/JointTrajectoryPoint, length: 9>'\n",
-            "t:2: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)",
+            "t:2:9: an array was shortened when it was printed; print it whole (ros2 topic echo --full-length, without --no-arr)",
         ),
         (
             &format!("{points}- {{time_from_start: 1.0}}\n"),
-            "t:3: point 1 has no `positions`; expected a position for each joint; ros2 topic echo prints them all with --full-length",
+            "t:3:3: point 1 has no `positions`; expected a position for each joint; ros2 topic echo prints them all with --full-length",
         ),
         (
             &format!("{points}- {{positions: [0, zero], time_from_start: 1.0}}\n"),
-            "t:3: `positions` is the text \"zero\"; expected numbers alone",
+            "t:3:19: `positions` is the text \"zero\"; expected numbers alone",
         ),
         (
             "joint_names: [joint_1, joint_1]\npoints:\n- {positions: [0, 0], time_from_start: 1.0}\n",
-            "t:1: joint \"joint_1\" is named twice in one message",
+            "t:1:14: joint \"joint_1\" is named twice in one message",
         ),
         (
             "name: [joint_1]\nposition: [0.0]\n---\nname: [joint_1]\nposition: [0.1]\n",
@@ -539,7 +539,7 @@ fn what_is_wrong_with_a_text_is_told_with_its_line() {
         ),
         (
             &format!("{points}- {{positions: [0, 0], time_from_start: soon}}\n"),
-            "t:3: `time_from_start` is the text \"soon\"; expected sec and nanosec, secs and nsecs, or seconds",
+            "t:3:40: `time_from_start` is the text \"soon\"; expected sec and nanosec, secs and nsecs, or seconds",
         ),
         (
             &format!("{points}- {{positions: [0, 0], time_from_start: 0}}\n"),

@@ -168,7 +168,7 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("$ORI_TYPE = #JOINT\nLIN {X 1,Y 2,Z 3,A 0,B 0,C 0}", "$ORI_TYPE = #JOINT is not read"),
         (
             "PTP {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 5}\nPTP {X 1,Y 2,Z 3,A 0,B 0,C 0,E1 6}",
-            "external axis 1 moves, from 5 (t.src:3) to 6",
+            "external axis 1 moves, from 5 (t.src:3:5) to 6",
         ),
         (
             "PTP {X 1,Y 2,Z 3,A 0,B 0,C 0}\nPTP {A1 10}",

@@ -118,7 +118,7 @@ fn statements_that_cannot_be_run_are_named_with_place_and_remedy() {
         ("MoveL $, v100, fine;", "the tool is missing: put `tool0` for the flange"),
         (
             "MoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[5,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;\nMoveL [[600,0,7],[1,0,0,0],[0,0,0,0],[9,9E9,9E9,9E9,9E9,9E9]], v100, fine, tool0;",
-            "external axis 1 moves, from 5 (t.mod:4) to 9",
+            "external axis 1 moves, from 5 (t.mod:4:7) to 9",
         ),
         ("SearchL di1, p1, p2, v100, tool0;", "this instruction changes the motion by data outside the program"),
         ("GOTO there;", "jumps (GOTO) are not read"),

@@ -20,6 +20,10 @@ const QUIET_JUMP: f64 = 1e-6;
 /// Unit of a velocity of a joint of either kind.
 pub(crate) const RATE: &str = "rad/s or m/s";
 
+/// Code of the warning about a given duration that takes a joint over an acceleration or jerk
+/// limit.
+pub(crate) const SHORT_DURATION: &str = "short-duration";
+
 const START_SPEED: FindingKind = FindingKind::warning(
     "motion-start-speed",
     "joint \"{where}\" starts with a velocity of {value} {unit} instead of {yardstick}, a jump that excites every mode: \

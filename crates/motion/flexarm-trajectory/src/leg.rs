@@ -7,8 +7,9 @@ use flexarm_settings::Finding;
 
 use crate::curve::Curve;
 use crate::error::PlanError;
+use crate::findings::SHORT_DURATION;
 use crate::optimal::JointPath;
-use crate::plan::{MotionLimits, PlannedMove, Profile, SHORT_DURATION};
+use crate::plan::{MotionLimits, PlannedMove, Profile};
 use crate::polynomial::Piece;
 use crate::shape::{self, Phases, ShapeLimits};
 use crate::via;

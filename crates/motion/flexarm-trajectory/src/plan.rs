@@ -7,7 +7,7 @@
 //! duration. An S-curve uses acceleration and jerk limits if both are given; otherwise each ramp
 //! takes a third of the duration, and each rise of the acceleration a third of that. If the
 //! duration is too short for these limits, the move gets the default ramps and a
-//! warning with the code [`SHORT_DURATION`].
+//! warning with the code `short-duration`.
 //!
 //! **No duration**: the move is as fast as the limits allow. If synchronised, all joints follow one
 //! common shape (a straight line in joint space) under the strictest limits; otherwise each joint
@@ -23,10 +23,6 @@ use crate::trajectory::Trajectory;
 
 /// Message about a plan that lasts no time.
 const STILL: &str = "nothing moves and nothing is held, so the trajectory lasts 0 s; add a move or a hold";
-
-/// Code of the warning about a given duration that takes a joint over an acceleration or jerk
-/// limit.
-pub(crate) const SHORT_DURATION: &str = "short-duration";
 
 /// Velocity profile of a move.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -8,9 +8,8 @@ use flexarm_settings::{Finding, Place};
 
 use crate::curve::{Curve, LONGEST, QUIET_SPEED};
 use crate::error::{SampleError, TrajectoryError};
-use crate::findings::{at, fault, of_curve};
+use crate::findings::{SHORT_DURATION, at, fault, of_curve};
 use crate::gap::Gap;
-use crate::plan::SHORT_DURATION;
 use crate::polynomial::Piece;
 use crate::table::request::KnownJoint;
 

@@ -214,7 +214,7 @@ fn what_is_assumed_or_left_out_is_told() {
     );
     assert!(told("timestamp;joint_1[rad]\n1700000000000;0\n1700000001000;0.5\n").contains("taken as ms since 1970"));
     assert!(told("Robot 7\nt[s];joint_1[rad]\n0;0\n1;0.5\n").contains("t:1: 1 line is above the header and not used"));
-    assert!(told("t[s];joint_1[rad]\n0;0\n0;0\n1;0.5\n").contains("1 rows repeat the one before"));
+    assert!(told("t[s];joint_1[rad]\n0;0\n0;0\n1;0.5\n").contains("t:3: 1 row repeats the one before"));
 }
 
 #[test]
