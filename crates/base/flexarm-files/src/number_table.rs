@@ -44,6 +44,7 @@ impl NumberTable {
             let (path, column) = (path.to_owned(), column.unwrap_or(1));
             TextFileError { path, line, column, message, page: "" }
         };
+        // The header is the first line that counts; it decides the separator.
         let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line));
         let counts = |line: &str| !line.trim().is_empty() && !line.trim_start().starts_with('#');
         let Some((header_line, header)) = lines.by_ref().find(|(_, line)| counts(line)) else {
@@ -54,6 +55,7 @@ impl NumberTable {
             csv_fields(line, |c| c == separator, false).iter().map(|cell| cell.trim().to_owned()).collect()
         };
         let column = |line: &str, field: usize| csv_column(line, |c| c == separator, false, field);
+        // Names are there, different, and not numbers.
         let names = cells(header);
         for (k, name) in names.iter().enumerate() {
             let message = match name {
@@ -69,6 +71,7 @@ impl NumberTable {
             };
             return Err(fault(header_line, column(header, k), message).into());
         }
+        // One number per name in each row.
         let mut table = Self { names, rows: Vec::new(), lines: Vec::new(), path: path.to_owned(), header_line };
         for (line, text) in lines.filter(|(_, line)| counts(line)) {
             let cells = cells(text);

@@ -1,4 +1,9 @@
 //! Result files: rejected before the work if a location is in use, and never left half written.
+//!
+//! Before the work [`check_free`] and [`check_apart`], after it [`write_all`]; a recording that
+//! grows during the work is a [`Partial`].
+//!
+//! Not here: what is written; names of files in a folder of results.
 
 use std::cell::RefCell;
 use std::fs::{File, OpenOptions};

@@ -1,4 +1,8 @@
 //! YAML, including JSON, as trees of text. The caller interprets the text.
+//!
+//! Start at [`read_yaml`]. Nodes are counted while they are read, so that aliases of aliases cannot
+//! fill the memory. Not here: meaning of keys and tags, JSON written by this program
+//! (`serde_json`).
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -90,6 +94,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
         let (line, column) = (span.start.line(), span.start.col() + 1);
         let fail = |message: String| E::from(YamlError { line, column, message });
         let new = |value, anchor| SizedNode { node: YamlNode { line, column, value }, anchor, size: 1, height: 0 };
+        // A text or an alias is done at once, a collection at its end.
         let mut done = None;
         match event {
             Event::Scalar(text, style, anchor, tag) => {
@@ -117,6 +122,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
             return Err(fail(format!("collections are nested more than {MAX_NESTED} deep")));
         }
         let Some(done) = done else { continue };
+        // An anchored node is copied, because an alias may follow.
         if done.anchor > 0 {
             count += done.size;
             anchors.insert(done.anchor, done.clone());
@@ -124,6 +130,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
         if count > most {
             return Err(fail(format!("more than {most} numbers and texts")));
         }
+        // What is done belongs to the innermost open collection, or is a document.
         match open.last_mut() {
             None => take(done.node)?,
             Some(outer) => outer.add(done),

@@ -1,9 +1,9 @@
 //! Building blocks of errors and caveats: settings named in messages, which each front end names in
-//! its own way ([`Setting`]); what is found in an input or a result ([`Finding`]) and where in a file
-//! ([`Place`]); the party responsible for an error ([`Fault`]); ranges of physical quantities
+//! its own way ([`Setting`]); what is found in an input or a result ([`Finding`]) and where in a
+//! file ([`Place`]); the party responsible for an error ([`Fault`]); ranges of physical quantities
 //! ([`Quantity`]); choices by a word ([`Words`]); lists that are not longer than their types
-//! ([`exact`]); TOML messages without type names ([`without_types`]); escaping of foreign text
-//! for each kind of output ([`written`]).
+//! ([`exact`]); TOML messages without type names ([`without_types`]); escaping of foreign text for
+//! each kind of output ([`written`]).
 //!
 //! "Try a smaller step" refers to a struct field in Rust, to a keyword argument in Python and to a
 //! flag on the command line. Errors and caveats therefore carry a [`Setting`], whose name is looked
@@ -40,7 +40,7 @@ pub use finding::{Finding, Severity};
 pub use gathered::gathered;
 pub use place::Place;
 pub use quantity::{OutOfRange, Quantity};
-pub use spelling::{closest, known_names};
+pub use spelling::{closest, known_names, listed};
 pub use toml_message::without_types;
 pub use words::Words;
 

@@ -1,4 +1,4 @@
-//! Suggestions for misspelt names.
+//! Names in messages: suggestions for misspelt ones, and lists of limited length.
 
 /// Maximum length of a name for which a suggestion is made (characters).
 const LONGEST_WORD: usize = 200;
@@ -31,5 +31,17 @@ pub fn known_names<S: AsRef<str> + std::fmt::Debug>(found: &str, known: &[S]) ->
     match closest(found, known.iter().map(AsRef::as_ref)) {
         Some(meant) => format!("{known:?}; did you mean {meant:?}?"),
         None => format!("{known:?}"),
+    }
+}
+
+/// Joins at most eight of `items` for a message: `a, b and 3 more`.
+pub fn listed<T: std::fmt::Display>(items: impl IntoIterator<Item = T>) -> String {
+    const MAX: usize = 8;
+    let mut items = items.into_iter();
+    let shown: Vec<String> = items.by_ref().take(MAX).map(|item| item.to_string()).collect();
+    match (shown.is_empty(), items.count()) {
+        (true, _) => "none".into(),
+        (false, 0) => shown.join(", "),
+        (false, more) => format!("{} and {more} more", shown.join(", ")),
     }
 }

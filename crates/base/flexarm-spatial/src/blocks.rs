@@ -1,6 +1,7 @@
 //! 6×6 block matrices for one or two interfaces, used to rotate and shift stiffness matrices.
 
-use nalgebra::{Matrix3, Matrix6, SMatrix};
+use nalgebra::allocator::Allocator;
+use nalgebra::{DefaultAllocator, Dim, Matrix3, Matrix6, OMatrix, SMatrix};
 
 /// Matrix for two interfaces: six components of A, then six of B.
 pub type Matrix12 = SMatrix<f64, 12, 12>;
@@ -21,7 +22,10 @@ pub fn twice(Q: &Matrix6<f64>) -> Matrix12 {
     result
 }
 
-/// Symmetric part `(K + Kᵀ)/2`; exact if K is already symmetric.
-pub fn symmetric_part(K: &Matrix6<f64>) -> Matrix6<f64> {
+/// Symmetric part `(K + Kᵀ)/2` of a square matrix; exact if K is already symmetric.
+pub fn symmetric_part<D: Dim>(K: &OMatrix<f64, D, D>) -> OMatrix<f64, D, D>
+where
+    DefaultAllocator: Allocator<D, D>,
+{
     (K + K.transpose()) * 0.5
 }

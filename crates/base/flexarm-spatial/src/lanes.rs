@@ -4,6 +4,8 @@
 //! `Four` and `Eight` implement [`Real`]: each lane gives bitwise the result of the same recursion
 //! over `f64`. The types are private; [`with_lanes`] passes them to its work after checking that
 //! the processor has the instructions.
+//!
+//! Not here: which runs or poses share a pass (`flexarm-stepping`).
 
 #![allow(unsafe_code, reason = "vector instructions, which are called where they were found to be there")]
 

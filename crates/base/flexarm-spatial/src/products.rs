@@ -2,6 +2,9 @@
 //! explicitly. nalgebra's general product of small matrices takes twice as many instructions, and
 //! over SIMD lanes inlining of its operations is not guaranteed, although it is required
 //! ([`crate::lanes`]). The order of sums is fixed, so results are the same on every machine.
+//!
+//! Plain arrays of numbers without frames or units; those are the caller's. Not here: six-vectors
+//! ([`crate::Twist`], [`crate::Wrench`]), functions of angles ([`crate::ElasticAngles`]).
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -4,6 +4,8 @@
 //! are rounded identically, none is contracted to a fused multiply-add, sums keep their order, and
 //! a value-dependent choice of formula is made per lane.
 //!
+//! Start at [`Real`]. Not here: the vector instructions ([`crate::lanes`]).
+//!
 //! Sine and cosine are computed here, so that they are the same on every machine: system libraries
 //! differ in the last bit between processors. Source: [Cody & Waite 1980] for the reduction;
 //! polynomial coefficients as in FreeBSD's `k_sin.c` and `k_cos.c`.

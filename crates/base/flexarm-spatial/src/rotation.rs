@@ -5,6 +5,8 @@
 //! velocity of Q in P, in **Q axes**, is `w_PQ_Q = B(angles) d(angles)/dt`. Start at
 //! [`ElasticAngles`].
 //!
+//! Not here: quaternions of files, springs over the angles.
+//!
 //! Source: [Shabana 2013], chapter 2, for Euler angles; [Bullo & Murray 1995] for the exponential
 //! map.
 

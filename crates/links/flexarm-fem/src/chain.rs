@@ -18,6 +18,9 @@
 //! cut at the joints, so each joint is in the middle of the material that it replaces.
 //!
 //! Source: Castigliano's theorem for `C_BB`; sharing by energy is our own.
+//!
+//! Start at `ChainSource::chain`. Link axes; compliances in m/N to rad/(N·m). Not here: chains of
+//! a beam in closed form (`beam_chain`), the volume of cut elements ([`crate::cut`]).
 
 use flexarm_spatial::{Pose, adjoint, skew, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
@@ -128,7 +131,7 @@ pub fn energy_by_slice(
 /// C_tr(S) = C_tr(B) - [p_BS]x C_rr,   skew part of C_tr(S) = 0:   three equations for S
 /// ```
 /// Source: Lončarić (1987), normal forms of stiffness and compliance matrices.
-pub fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vector3<f64>> {
+pub(crate) fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vector3<f64>> {
     let C_tr = C.fixed_view::<3, 3>(0, 3).into_owned();
     let C_rr = C.fixed_view::<3, 3>(3, 3).into_owned();
     // u_S = u_B + theta x p_BS = u_B - [p]x theta, so C_tr(S) = C_tr - [p]x C_rr. The axial vector
@@ -140,7 +143,7 @@ pub fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vect
 
 /// Inputs for cutting a mesh into a chain.
 #[derive(Debug, Clone, Copy)]
-pub struct ChainSource<'a> {
+pub(crate) struct ChainSource<'a> {
     /// Mesh, link axes.
     pub mesh: &'a Mesh,
     /// FE model of the mesh.
@@ -173,7 +176,7 @@ impl ChainSource<'_> {
     ///
     /// # Errors
     /// [`ChainError`].
-    pub fn chain(&self, parts: usize) -> Result<Chain, ChainError> {
+    pub(crate) fn chain(&self, parts: usize) -> Result<Chain, ChainError> {
         if parts < 2 {
             return Err(ChainError::TooFewParts { parts });
         }
@@ -233,7 +236,7 @@ impl Chain {
 
     /// Stiffness and mass over the joint coordinates, A clamped: `K = blkdiag(K_S)`,
     /// `M = Σ J_iᵀ M_i J_i`.
-    pub fn held_matrices(&self) -> (DMatrix<f64>, DMatrix<f64>) {
+    pub(crate) fn held_matrices(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, carries) = (6 * self.joints.len(), self.carries());
         let (mut K, mut M) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
         for (k, joint) in self.joints.iter().enumerate() {

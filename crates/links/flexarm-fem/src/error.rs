@@ -32,6 +32,14 @@ pub enum FemError {
         /// Hint for a correction.
         help: &'static str,
     },
+    /// The elements of a beam could not be assembled, condensed or solved.
+    #[error("the {step} of the beam elements failed: {cause}; is the section possible at this length?")]
+    BeamElements {
+        /// Step that failed.
+        step: &'static str,
+        /// Its error.
+        cause: String,
+    },
     /// A name is not in a table of names.
     #[error("{what} {found:?} is not known; known are {known}")]
     UnknownName {

@@ -28,7 +28,7 @@ impl LinkFrames {
     }
 
     /// Places S on the straight line from A to B, in link axes.
-    pub fn with_split_fraction(self, fraction: f64) -> Self {
+    pub(crate) fn with_split_fraction(self, fraction: f64) -> Self {
         let p_LA = self.X_LA.translation.vector;
         let p_LS = p_LA + self.p_AB() * fraction;
         self.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z))

@@ -13,7 +13,10 @@
 //! A positive definite `K_BB` together with the block identity implies that the 12×12 has exactly
 //! six zero and six positive eigenvalues, so these are not counted separately.
 //!
-//! Start at [`check_matrix12`] or [`check_matrix6`].
+//! Start at [`check_matrix12`] or [`check_matrix6`]. Matrices in link axes, SI; A before B, linear
+//! first.
+//!
+//! Not here: checks against a mesh ([`crate::mesh_gate`]).
 
 use flexarm_spatial::{Matrix12, Pose, adjoint, symmetric_part};
 use nalgebra::{Matrix6, SMatrix, SVector, SymmetricEigen, Vector3};

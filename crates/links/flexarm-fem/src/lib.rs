@@ -61,11 +61,10 @@ mod open_section;
 pub mod order_check;
 pub mod reduced;
 pub mod reduction;
-pub mod rigid_part;
+mod rigid_part;
 pub mod section;
 mod section_outline;
 pub mod sparse;
-pub mod spelling;
 pub mod stress;
 #[cfg(test)]
 #[path = "../tests/test_mesh.rs"]

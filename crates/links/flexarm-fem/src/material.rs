@@ -1,14 +1,15 @@
 //! Isotropic linear elastic materials.
 //!
 //! The presets are textbook values for a first estimate; prefer a certificate or a test of the
-//! part.
+//! part. Start at [`Material::named`]; [`Material::warnings`] finds wrong units.
+//!
+//! Not here: Hooke's law of a solid ([`crate::element`]), strength, damping.
 
 use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
 use crate::error::{FemError, positive};
-use crate::spelling;
 use crate::units::UnitSystem;
 
 /// Isotropic linear elastic material.
@@ -91,8 +92,9 @@ impl Material {
     /// Preset whose name is closest to an unknown name.
     pub fn suggestion(name: &str) -> Option<&'static str> {
         let others = Self::OTHER_NAMES.iter().map(|(other, _)| *other);
-        let found = spelling::nearest(&plain(name), Self::PRESETS.iter().map(|(known, _)| *known).chain(others))?;
-        Self::preset(found).map(|(known, _)| known)
+        let found =
+            flexarm_settings::closest(&plain(name), Self::PRESETS.iter().map(|(known, _)| *known).chain(others))?;
+        Self::preset(&found).map(|(known, _)| known)
     }
 
     /// Looks up a preset as [`Self::preset`] does, or returns an error that lists all presets.

@@ -8,7 +8,9 @@
 //!
 //! Matrices do not describe the distribution of mass along the link. The two rigid parts are either
 //! given or are the halves of the uniform bar with the same mass, centre of mass and inertia
-//! ([`halves_of_bar`]); the latter gives a warning.
+//! ([`halves_of_bar`]); the latter gives a warning. Link axes, SI.
+//!
+//! Not here: formats of matrices (`flexarm-fe-io`), meshes ([`crate::mesh_link`]).
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, Vector3};
@@ -117,6 +119,7 @@ pub fn link_from_superelement(
     has_mass: bool,
     plan: &MatrixPlan,
 ) -> Result<MatrixReduction, MeshLinkError> {
+    // Stiffness of A and B, and the split frame.
     let loose = FemError::Missing { what: "stiffness of an interface or a mode", help: "it holds nothing" };
     let K12 = stiffness12(&element).ok_or(loose)?;
     let frames = LinkFrames::new(element.interfaces[0].X_LI, element.interfaces[1].X_LI);
@@ -125,6 +128,7 @@ pub fn link_from_superelement(
     caveats.extend(said.map(|said| Finding::warning("split", "", said, "")));
     let frames = frames.with_split(Pose::translation(p.x, p.y, p.z));
 
+    // The whole body, then its two parts.
     let whole = match &plan.masses {
         PartMasses::Given([proximal, distal]) => proximal.merged(distal),
         PartMasses::Whole(whole) => whole.clone(),
@@ -148,6 +152,7 @@ pub fn link_from_superelement(
             halves_of_bar(&whole, &frames.p_AB())
         }
     };
+    // The link, which passes the gate here; then frequencies and masses are compared with the matrices.
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
     let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
     if has_mass && held_frequencies_hz.is_empty() {

@@ -1,4 +1,9 @@
 //! Checks of every reduction of a mesh, with numbers; written into the link file and the report.
+//!
+//! Start at [`MeshGate`]; [`MeshGate::findings`] turns numbers above their limits into warnings.
+//!
+//! Not here: the computation of the checks (`mesh_link::checks`), limits of a 6×6 or 12×12
+//! stiffness ([`crate::gate`]).
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -46,7 +51,7 @@ pub struct ElementQuality {
     /// Number in the file of the element with the minimum fullness.
     #[serde(default)]
     pub flattest_element: u64,
-    /// Number of elements below [`MeshGate::SMALLEST_FULLNESS`].
+    /// Number of elements below a fullness of 0.01.
     #[serde(default)]
     pub flat_elements: usize,
     /// Maximum distance of a mid-side node from the middle of its edge, relative to the edge
@@ -188,12 +193,12 @@ impl MeshGate {
     /// Jacobian at a node, relative to the mean of its element, below which [`Self::findings`] warns.
     pub const SMALLEST_JACOBIAN: f64 = 0.05;
     /// Volume of an element, relative to the ideal shape, below which the element counts as flat.
-    pub const SMALLEST_FULLNESS: f64 = 0.01;
+    pub(crate) const SMALLEST_FULLNESS: f64 = 0.01;
     /// Fraction of flat elements above which [`Self::findings`] warns.
-    pub const FEW_FLAT: f64 = 1e-3;
+    pub(crate) const FEW_FLAT: f64 = 1e-3;
     /// Offset of a mid-side node, relative to its edge length, above which [`Self::findings`] warns:
     /// an arc of 140 degrees.
-    pub const LARGEST_OFFSET: f64 = 0.35;
+    pub(crate) const LARGEST_OFFSET: f64 = 0.35;
 
     /// Returns warnings about results that pass but are suspicious.
     pub fn findings(&self) -> Vec<Finding> {

@@ -13,7 +13,7 @@
 //! few dozen products are enough and no new factorisation is needed. Edges on a rigidly tied face
 //! stay straight.
 //!
-//! Start at [`check_order`]. Not here: the discretisation error of second-order elements.
+//! Start at `check_order`. Not here: the discretisation error of second-order elements.
 //!
 //! Source: [Zienkiewicz, Gago & Kelly 1983].
 
@@ -86,7 +86,7 @@ impl OrderCheck {
 ///
 /// # Errors
 /// [`AssemblyError`] if the second-order model cannot be assembled.
-pub fn check_order(
+pub(crate) fn check_order(
     mesh: &Mesh,
     options: &AssemblyOptions,
     interfaces: &[Interface],

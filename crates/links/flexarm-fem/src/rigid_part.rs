@@ -1,6 +1,11 @@
 //! Rigid part of a cut link: mass, centre of mass, inertia, and checks that they are possible.
+//!
+//! Link axes; the inertia is about the centre of mass, kg·m². Start at [`RigidPart`].
+//!
+//! Not here: the cut of a mesh ([`crate::cut`]), spatial inertias of recursions
+//! ([`flexarm_spatial::SpatialInertia`]).
 
-use flexarm_spatial::{Pose, skew};
+use flexarm_spatial::{Pose, skew, symmetric_part};
 use nalgebra::{Matrix3, Matrix6, SymmetricEigen, Vector3};
 
 use crate::error::{FemError, positive};
@@ -34,8 +39,7 @@ impl RigidPart {
 
     /// Removes the rounding asymmetry of the inertia.
     pub(crate) fn symmetrised(&self) -> Self {
-        let inertia = (self.inertia + self.inertia.transpose()) * 0.5;
-        Self { inertia, ..self.clone() }
+        Self { inertia: symmetric_part(&self.inertia), ..self.clone() }
     }
 
     /// Merges this part and another one into a single rigid body.
@@ -100,7 +104,7 @@ impl RigidPart {
             let part = part.to_owned();
             Err(FemError::ImpossibleInertia { part, principal, rule })
         };
-        let symmetric = (self.inertia + self.inertia.transpose()) * 0.5;
+        let symmetric = symmetric_part(&self.inertia);
         let size = symmetric.amax();
         if !self.inertia.iter().all(|x| x.is_finite()) || !size.is_finite() {
             return refuse([f64::NAN; 3], "every moment must be finite");

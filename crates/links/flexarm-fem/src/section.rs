@@ -7,6 +7,9 @@
 //! [`SectionProperties::shear_centre_y`].
 //!
 //! Start at [`Section::bar`]; [`Section::properties`] is the purely geometric step.
+//!
+//! Not here: I-beams and channels (`open_section`), stress on the outline (`section_outline`), the element
+//! ([`crate::beam`]).
 
 use std::f64::consts::PI;
 

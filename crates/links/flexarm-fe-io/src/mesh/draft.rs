@@ -11,8 +11,8 @@ use super::ids::IdIndex;
 use super::source::Source;
 use crate::FeFileError;
 use flexarm_fem::mesh::{ElementBlock, ElementKind, Mesh, Region, corner_count, turn_reversed};
-use flexarm_fem::spelling::listed;
 use flexarm_fem::units::UnitSystem;
+use flexarm_settings::listed;
 
 /// Nodes, elements and regions in the numbers and units of the file. Offsets are for messages.
 #[derive(Default)]

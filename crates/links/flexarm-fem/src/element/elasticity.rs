@@ -1,6 +1,4 @@
-//! Isotropic linear elasticity of a solid: Lamé constants and the stress-strain matrix.
-
-use nalgebra::Matrix6;
+//! Isotropic linear elasticity of a solid: check of a material, and Lamé constants.
 
 use crate::error::FemError;
 use crate::material::Material;
@@ -17,7 +15,7 @@ const SHEAR_SLACK: f64 = 1e-9;
 /// # Errors
 /// [`FemError::OutOfRange`]: as [`Material::check`]; `nu = 0.5` (the bulk modulus is infinite); a
 /// `G` that differs from `E / (2 (1 + nu))` by more than 1e-9 of it.
-pub fn check_solid_material(material: &Material) -> Result<(), FemError> {
+pub(crate) fn check_solid_material(material: &Material) -> Result<(), FemError> {
     material.check()?;
     let refuse =
         |what: &str, found, allowed: String| Err(FemError::OutOfRange { what: what.to_owned(), found, allowed });
@@ -41,48 +39,15 @@ pub(crate) fn lame(material: &Material) -> (f64, f64) {
     (E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu)))
 }
 
-/// Stress-strain matrix `D` (Hooke's law), Pa: `sigma = D epsilon`, energy density
-/// `epsilonᵀ D epsilon / 2`.
-///
-/// Order `xx yy zz xy yz zx`; shear strains are engineering strains `gamma_xy = du_x/dy + du_y/dx`.
-///
-/// # Errors
-/// As [`check_solid_material`].
-pub fn stress_strain(material: &Material) -> Result<Matrix6<f64>, FemError> {
-    check_solid_material(material)?;
-    let (lambda, mu) = lame(material);
-    let mut D = Matrix6::zeros();
-    for i in 0..3 {
-        for j in 0..3 {
-            D[(i, j)] = lambda;
-        }
-        D[(i, i)] += 2.0 * mu;
-        D[(i + 3, i + 3)] = mu;
-    }
-    Ok(D)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector6;
-
-    /// Truth: a bar under tension has sigma = E epsilon along it and no stress across it.
-    #[test]
-    fn a_bar_under_tension_narrows_by_poissons_ratio() {
-        let steel = Material::STEEL;
-        let D = stress_strain(&steel).unwrap();
-        let stress = D * Vector6::new(1.0, -steel.nu, -steel.nu, 0.5, 0.0, 0.0);
-        let expected = Vector6::new(steel.E, 0.0, 0.0, 0.5 * steel.shear_modulus(), 0.0, 0.0);
-        assert!((stress - expected).amax() < 1e-13 * steel.E); // measured 0
-    }
-
     #[test]
     fn a_solid_refuses_a_third_constant_and_incompressibility() {
         let own_shear = Material { G: Some(70e9), ..Material::STEEL };
         assert!(check_solid_material(&own_shear).unwrap_err().to_string().contains("shear modulus"));
         let same_shear = Material { G: Some(210e9 / 2.6), ..Material::STEEL };
         check_solid_material(&same_shear).unwrap();
-        assert!(stress_strain(&Material::isotropic(1e6, 0.5, 1000.0)).is_err());
+        assert!(check_solid_material(&Material::isotropic(1e6, 0.5, 1000.0)).is_err());
     }
 }

@@ -1,4 +1,9 @@
 //! Map from reference to real element: Jacobian, classification and inversion checks.
+//!
+//! Start at [`jacobian_range`]. `J = dx/dξ`, m; `det J` is positive in a valid element.
+//!
+//! Not here: the rule that a class of geometry gets (`rules`), the fix of mirrored meshes
+//! ([`crate::mesh::turn_reversed`]).
 
 use std::fmt;
 
@@ -50,7 +55,7 @@ impl std::error::Error for InvertedElement {}
 /// Shape quality of an element: the ratios are 1 for a parallelepiped, and zero or less if it is
 /// inverted.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct JacobianRange {
+pub(crate) struct JacobianRange {
     /// Minimum `det J` over the Gauss points of the exact stiffness, relative to `|mean|`.
     pub min_gauss: f64,
     /// Gauss point of the minimum, from 0.
@@ -69,7 +74,7 @@ pub struct JacobianRange {
 ///
 /// # Panics
 /// For a beam, and for a wrong number of nodes.
-pub fn jacobian_range(kind: ElementKind, x: &[Vector3<f64>]) -> JacobianRange {
+pub(crate) fn jacobian_range(kind: ElementKind, x: &[Vector3<f64>]) -> JacobianRange {
     let nodes = Nodes::new(kind, x);
     let all = tables(kind);
     let volume: f64 = dets(all.mass(nodes.geometry), &nodes).map(|(w, det)| w * det).sum();

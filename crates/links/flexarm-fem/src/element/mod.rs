@@ -1,8 +1,8 @@
 //! Solid elements: shape functions, quadrature, stiffness and mass of one element.
 //!
-//! Start at [`ElementWorkspace::stiffness_and_mass`]. [`for_each_point`] visits the quadrature
-//! points with shape functions and gradients; [`jacobian_range`] measures the shape quality of an
-//! element. TET4, TET10, HEX8, HEX20, WEDGE6 and WEDGE15, isoparametric, isotropic linear
+//! Start at `ElementWorkspace::stiffness_and_mass`. `for_each_point` visits the quadrature
+//! points with the gradients of the shape functions; `jacobian_range` measures the shape quality
+//! of an element. TET4, TET10, HEX8, HEX20, WEDGE6 and WEDGE15, isoparametric, isotropic linear
 //! elasticity, in m, Pa and kg; node order as in [`ElementKind`](crate::ElementKind).
 //!
 //! Notation: `xi = (r, s, t)` reference coordinates, `N_i` shape functions, `J = dx/dxi`, `det` its
@@ -20,13 +20,13 @@ mod solid;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use elasticity::lame;
-pub use elasticity::{check_solid_material, stress_strain};
-pub use geometry::{InversionPoint, InvertedElement, JacobianRange, jacobian_range};
+pub(crate) use elasticity::{check_solid_material, lame};
+pub(crate) use geometry::jacobian_range;
+pub use geometry::{InversionPoint, InvertedElement};
 #[cfg(test)]
 pub(crate) use quadrature::gauss_jacobi;
 pub(crate) use quadrature::{TetRule, tet_points};
-pub use rules::{Point, Purpose, Quadrature, for_each_point};
-pub use shape::{edges, reference_nodes, reference_volume, shape_functions};
-pub use solid::ElementWorkspace;
-pub(crate) use solid::mode_gradients_at;
+pub use rules::Quadrature;
+pub(crate) use rules::{Point, Purpose, for_each_point};
+pub(crate) use shape::{edges, reference_nodes, shape_functions};
+pub(crate) use solid::{ElementWorkspace, mode_gradients_at};

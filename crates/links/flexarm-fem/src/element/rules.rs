@@ -1,4 +1,9 @@
 //! Choice of quadrature per element, shape functions tabulated at its points, and a visitor.
+//!
+//! Start at [`Quadrature`], whose table lists the rules, and [`for_each_point`].
+//!
+//! Not here: points and weights of the rules (`quadrature`), classification of an element
+//! (`geometry`).
 
 use std::sync::OnceLock;
 
@@ -39,7 +44,7 @@ pub enum Quadrature {
 
 /// Purpose of the quadrature points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Purpose {
+pub(crate) enum Purpose {
     /// Products of two gradients.
     Stiffness,
     /// Products of two shape functions, or of two coordinates: mass, centre of mass, inertia.
@@ -48,23 +53,20 @@ pub enum Purpose {
 
 /// One quadrature point of an element.
 #[derive(Debug, Clone, Copy)]
-pub struct Point<'a> {
+pub(crate) struct Point<'a> {
     /// Position, m.
     pub position: Vector3<f64>,
     /// Reference coordinates.
     pub xi: [f64; 3],
     /// Weight times `det J`, m³; the weights add up to the volume.
     pub weight: f64,
-    /// Shape functions, one per node.
-    pub N: &'a [f64],
     /// Gradients of the shape functions, 1/m.
     pub dN: &'a [Vector3<f64>],
 }
 
 /// Visits the quadrature points of an element in a fixed order.
 ///
-/// The incompatible modes of HEX8 are not included: `N` and the gradients are those of the eight
-/// nodes.
+/// The incompatible modes of HEX8 are not included: the gradients are those of the eight nodes.
 ///
 /// # Errors
 /// [`InvertedElement`] at the first point without a positive `det J`; `visit` has already been
@@ -72,7 +74,7 @@ pub struct Point<'a> {
 ///
 /// # Panics
 /// For a beam, and for a wrong number of nodes.
-pub fn for_each_point(
+pub(crate) fn for_each_point(
     kind: ElementKind,
     x: &[Vector3<f64>],
     purpose: Purpose,
@@ -93,12 +95,10 @@ pub fn for_each_point(
         for i in 0..n {
             dN[i] = Vector3::new(flat[i], flat[n + i], flat[2 * n + i]);
         }
-        let N = table.N(p);
         visit(&Point {
-            position: N.iter().zip(x).map(|(N_i, x_i)| x_i * *N_i).sum(),
+            position: table.N(p).iter().zip(x).map(|(N_i, x_i)| x_i * *N_i).sum(),
             xi: table.xi[p],
             weight: table.weight[p] * jacobian.det,
-            N,
             dN: &dN[..n],
         });
     }

@@ -71,7 +71,7 @@ const WEDGE_EDGES: [[usize; 2]; 9] = [[0, 1], [1, 2], [2, 0], [3, 4], [4, 5], [5
 ///
 /// # Panics
 /// For a beam.
-pub fn reference_nodes(kind: ElementKind) -> &'static [[f64; 3]] {
+pub(crate) fn reference_nodes(kind: ElementKind) -> &'static [[f64; 3]] {
     match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => &TET[..kind.nodes()],
         ElementKind::Hex8 | ElementKind::Hex20 => &HEX[..kind.nodes()],
@@ -84,7 +84,7 @@ pub fn reference_nodes(kind: ElementKind) -> &'static [[f64; 3]] {
 ///
 /// # Panics
 /// For a beam.
-pub fn edges(kind: ElementKind) -> &'static [[usize; 2]] {
+pub(crate) fn edges(kind: ElementKind) -> &'static [[usize; 2]] {
     match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => &TET_EDGES,
         ElementKind::Hex8 | ElementKind::Hex20 => &HEX_EDGES,
@@ -97,7 +97,7 @@ pub fn edges(kind: ElementKind) -> &'static [[usize; 2]] {
 ///
 /// # Panics
 /// For a beam.
-pub fn reference_volume(kind: ElementKind) -> f64 {
+pub(crate) fn reference_volume(kind: ElementKind) -> f64 {
     match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => 1.0 / 6.0,
         ElementKind::Hex8 | ElementKind::Hex20 => 8.0,
@@ -110,7 +110,7 @@ pub fn reference_volume(kind: ElementKind) -> f64 {
 ///
 /// # Panics
 /// For a beam, and for slices shorter than the number of nodes.
-pub fn shape_functions(kind: ElementKind, xi: [f64; 3], N: &mut [f64], dN: &mut [[f64; 3]]) {
+pub(crate) fn shape_functions(kind: ElementKind, xi: [f64; 3], N: &mut [f64], dN: &mut [[f64; 3]]) {
     match kind {
         ElementKind::Tet4 => tet4(xi, N, dN),
         ElementKind::Tet10 => tet10(xi, N, dN),

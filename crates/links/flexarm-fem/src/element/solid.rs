@@ -1,11 +1,19 @@
 //! Stiffness and mass of one solid element.
+//!
+//! ```text
+//! K_ij = ∫ λ a_i a_jᵀ + μ (a_j a_iᵀ + a_i·a_j 1) dV,   a_i = ∇N_i         m_ij = ∫ ρ N_i N_j dV
+//! ```
+//! Start at [`ElementWorkspace::stiffness_and_mass`]. Matrices are square, both triangles filled;
+//! rows `ux uy uz` node by node, mesh axes, N/m and kg.
+//!
+//! Not here: rules and points (`rules`), the Jacobian (`geometry`), assembly ([`crate::model`]).
 
 use nalgebra::{SMatrix, Vector3};
 
 use super::elasticity::lame;
 use super::geometry::{Geometry, InvertedElement, Jacobian, Nodes, check_nodes};
 use super::rules::{Quadrature, Table, tables};
-use super::shape::{MAX_NODES, no_beam, reference_volume};
+use super::shape::{MAX_NODES, no_beam};
 use crate::material::Material;
 use crate::mesh::ElementKind;
 
@@ -17,26 +25,19 @@ const MAX_PAIRS: usize = MAX_NODES * (MAX_NODES + 1) / 2;
 
 /// Buffers for the matrices of one element; nothing is allocated after [`Self::new`].
 #[derive(Debug, Clone)]
-pub struct ElementWorkspace {
+pub(crate) struct ElementWorkspace {
     n: usize,
-    volume: f64,
     /// `∫ dN_i/dx_a dN_j/dx_b`, component by component: row `a n + i`, column `b n + j`.
     products: Vec<f64>,
     stiffness: Vec<f64>,
     mass: Vec<f64>,
 }
 
-impl Default for ElementWorkspace {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 impl ElementWorkspace {
     /// Allocates room for the largest element.
-    pub fn new() -> Self {
+    pub(crate) fn new() -> Self {
         let zeros = || vec![0.0; MAX_DOF * MAX_DOF];
-        Self { n: 0, volume: 0.0, products: zeros(), stiffness: zeros(), mass: vec![0.0; MAX_NODES * MAX_NODES] }
+        Self { n: 0, products: zeros(), stiffness: zeros(), mass: vec![0.0; MAX_NODES * MAX_NODES] }
     }
 
     /// Computes stiffness and mass of one element; read them with [`Self::stiffness`] and
@@ -63,7 +64,7 @@ impl ElementWorkspace {
     ///
     /// # Source
     /// Modes: Taylor, Beresford & Wilson (1976), *Int. J. Numer. Meth. Eng.* 10.
-    pub fn stiffness_and_mass(
+    pub(crate) fn stiffness_and_mass(
         &mut self,
         kind: ElementKind,
         x: &[Vector3<f64>],
@@ -112,18 +113,13 @@ impl ElementWorkspace {
     /// Stiffness, 3n × 3n by rows, N/m; DoF `ux uy uz` of the first node, then of the second, ...
     ///
     /// Exactly symmetric, bit for bit.
-    pub fn stiffness(&self) -> &[f64] {
+    pub(crate) fn stiffness(&self) -> &[f64] {
         &self.stiffness[..9 * self.n * self.n]
     }
 
     /// Consistent mass, n × n by rows, kg; the 3n × 3n mass is each entry times the 3 × 3 identity.
-    pub fn mass(&self) -> &[f64] {
+    pub(crate) fn mass(&self) -> &[f64] {
         &self.mass[..self.n * self.n]
-    }
-
-    /// Volume, m³.
-    pub fn volume(&self) -> f64 {
-        self.volume
     }
 
     /// Computes both matrices for N nodes; D = 3 × (nodes and incompatible modes).
@@ -146,7 +142,6 @@ impl ElementWorkspace {
         let mut pairs = [0.0; MAX_PAIRS];
         let pairs = &mut pairs[..N * (N + 1) / 2];
         if affine {
-            self.volume = reference_volume(kind) * largest_det;
             for (m, reference) in pairs.iter_mut().zip(&all.reference_mass) {
                 *m = material.rho * largest_det * reference;
             }
@@ -154,7 +149,7 @@ impl ElementWorkspace {
             if rule == Quadrature::Exact {
                 check_nodes(kind, nodes, largest_det)?;
             }
-            self.volume = shape_products::<N>(kind, all.mass_for(rule, nodes.geometry), nodes, material.rho, pairs)?;
+            shape_products::<N>(kind, all.mass_for(rule, nodes.geometry), nodes, material.rho, pairs)?;
         }
         unpack(N, pairs, &mut self.mass);
         Ok(())
@@ -293,23 +288,21 @@ fn condense(K: &mut [f64], dof: usize, kept: usize) {
     }
 }
 
-/// Adds `Σ ρ w det N Nᵀ` to the upper triangle by rows; returns the volume.
+/// Adds `Σ ρ w det N Nᵀ` to the upper triangle by rows.
 fn shape_products<const N: usize>(
     kind: ElementKind,
     table: &Table,
     nodes: &Nodes,
     rho: f64,
     pairs: &mut [f64],
-) -> Result<f64, InvertedElement> {
-    let mut volume = 0.0;
+) -> Result<(), InvertedElement> {
     for p in 0..table.len() {
         let weight = table.weight[p] * Jacobian::checked(kind, N, table, p, &nodes.x)?.det;
-        volume += weight;
         for (m, NN) in pairs.iter_mut().zip(table.NN(p)) {
             *m += rho * weight * NN;
         }
     }
-    Ok(volume)
+    Ok(())
 }
 
 /// Expands the upper triangle to both.

@@ -1,4 +1,9 @@
 //! Optional tables of a reduced-link file: `[superelement]`, `[[chain]]`, `[modal]` and `[gate]`.
+//!
+//! Start at [`read_details`] and [`write_details`]. SI only, link axes. Each table is checked
+//! against the 6×6 stiffness and the mass of its link.
+//!
+//! Not here: the tables of every link file (`read`, `write`), the rows of `[modal]` (`modal`).
 
 use nalgebra::{DMatrix, Matrix6};
 use serde::Deserialize;
@@ -78,6 +83,7 @@ pub(super) fn read_details(
     link: &mut ReducedLink,
     limits: &GateLimits,
 ) -> Result<(), FlexFileError> {
+    // Units other than SI are refused: these matrices have rows of several units.
     let mut details = LinkDetails::default();
     for key in ["superelement", "chain", "attached", "modal"] {
         let found = root.get(key);
@@ -86,6 +92,7 @@ pub(super) fn read_details(
             return Err(node.fail(FlexErrorKind::Unit, found, "m, N, kg: these tables are in SI only", help));
         }
     }
+    // Each table is read, then checked against the link.
     if let Some(node) = root.get("superelement") {
         details.superelement = Some(read_superelement(&node, units, link, limits)?);
     }
@@ -104,6 +111,7 @@ pub(super) fn read_details(
     if let Some(node) = root.get("modal") {
         details.modal = Some(super::modal::read_modal(&node, units, link, AGREEMENT)?);
     }
+    // The gate is a report; nothing is computed from it.
     if let Some(node) = root.get("gate") {
         #[derive(Deserialize)]
         struct OnlyGate {

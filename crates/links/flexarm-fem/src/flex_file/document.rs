@@ -1,4 +1,8 @@
 //! TOML document in which every value has a position, so that errors can point to it.
+//!
+//! Start at [`Document::root`]; [`Table`] and [`Node`] check keys, types and sizes.
+//!
+//! Not here: the keys of a link file (`read`, `details`).
 
 use std::ops::Range;
 

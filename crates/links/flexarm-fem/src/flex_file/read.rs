@@ -1,4 +1,8 @@
 //! Reads text into a [`ReducedLink`]: structure first, then units, then the checks of the link.
+//!
+//! Start at [`read_flex`]. Every error names file, line, column and element.
+//!
+//! Not here: values with their places (`document`), optional tables (`details`).
 
 use std::path::Path;
 

@@ -1,4 +1,9 @@
 //! Distinct nodes at the same position: parts that were never joined, and cracks inside a body.
+//!
+//! Start at [`coincident`]; [`Mesh::merge_coincident`] joins them. Distances in m.
+//!
+//! Not here: faces that touch without matching (`fit`), bodies joined at a point or an edge
+//! (`hinges`).
 
 use std::collections::HashMap;
 
@@ -8,7 +13,7 @@ use super::Mesh;
 use super::surface::skin;
 
 /// Default distance below which nodes coincide, relative to the diagonal of the mesh.
-pub const COINCIDENT: f64 = 1e-6;
+const COINCIDENT: f64 = 1e-6;
 
 /// Distinct nodes at the same position.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -92,7 +97,7 @@ fn drop_neighbours(mesh: &Mesh, pairs: &mut Vec<[u32; 2]>) {
 }
 
 impl Mesh {
-    /// Default distance below which its nodes coincide: [`COINCIDENT`] times the diagonal, m.
+    /// Default distance below which its nodes coincide: `COINCIDENT` times the diagonal, m.
     pub fn coincidence(&self) -> f64 {
         COINCIDENT * self.bounding_box().map_or(0.0, |(low, high)| (high - low).norm())
     }

@@ -41,7 +41,7 @@ pub(super) const fn face_corners(kind: ElementKind) -> &'static [&'static [u8]] 
 }
 
 /// Whether the kind has mid-side nodes.
-pub const fn is_second_order(kind: ElementKind) -> bool {
+pub(crate) const fn is_second_order(kind: ElementKind) -> bool {
     matches!(kind, ElementKind::Tet10 | ElementKind::Hex20 | ElementKind::Wedge15)
 }
 

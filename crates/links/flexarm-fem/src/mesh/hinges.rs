@@ -115,7 +115,7 @@ fn first_elements(mesh: &Mesh, offsets: &[usize]) -> Vec<usize> {
 impl std::fmt::Display for Hinge {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let ((large, a), (small, b)) = (self.first, self.second);
-        let nodes = crate::spelling::listed(&self.node_ids);
+        let nodes = flexarm_settings::listed(&self.node_ids);
         write!(
             f,
             "the body of {large} elements with element {a} and that of {small} with element {b} share {} node(s) ({nodes}), \

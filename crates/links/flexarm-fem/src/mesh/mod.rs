@@ -29,13 +29,14 @@ use crate::beam::BeamTheory;
 use crate::material::Material;
 use crate::section::Section;
 
-pub use coincident::{COINCIDENT, Coincident, coincident};
-pub use faces::{corner_count, face_nodes, is_second_order};
+pub use coincident::{Coincident, coincident};
+pub use faces::{corner_count, face_nodes};
 pub use fit::{Misfit, misfits};
 pub use hinges::{Bodies, Hinge, bodies};
 pub use orientation::turn_reversed;
 pub use parts::{Part, connected_parts};
-pub use promote::{Promoted, added_nodes, promoted, second_order};
+pub use promote::second_order;
+pub(crate) use promote::{added_nodes, promoted};
 pub use select::{SelectError, select};
 pub use selector::{NodeSelector, SelectorSyntaxError};
 pub use surface::{Skin, SkinFace, skin};

@@ -1,4 +1,7 @@
 //! Reverses elements with inverted node order, as after a mirrored import, if all of a kind are.
+//!
+//! Start at [`turn_reversed`]. Not here: single inverted elements, which the assembly refuses
+//! ([`crate::model::AssemblyError`]).
 
 use nalgebra::Vector3;
 

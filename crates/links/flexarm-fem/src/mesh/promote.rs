@@ -1,4 +1,6 @@
 //! Converts a first-order mesh to second order by adding a node in the middle of every edge.
+//!
+//! Start at [`promoted`]. Not here: how much stiffer the first order is ([`crate::order_check`]).
 
 use std::collections::{HashMap, HashSet};
 
@@ -7,7 +9,7 @@ use super::{ElementBlock, ElementKind, Mesh};
 
 /// Second-order mesh, and the edges of its new nodes.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Promoted {
+pub(crate) struct Promoted {
     /// Mesh with the original nodes in their order, then the new ones; edges are straight.
     pub mesh: Mesh,
     /// End nodes of the edge of each new node.
@@ -25,7 +27,7 @@ pub fn second_order(kind: ElementKind) -> Option<ElementKind> {
 }
 
 /// Number of nodes that [`promoted`] would add.
-pub fn added_nodes(mesh: &Mesh) -> usize {
+pub(crate) fn added_nodes(mesh: &Mesh) -> usize {
     let first = |block: &&ElementBlock| second_order(block.kind).is_some();
     let mut known = HashSet::new();
     for block in mesh.blocks.iter().filter(first) {
@@ -38,7 +40,7 @@ pub fn added_nodes(mesh: &Mesh) -> usize {
 
 /// Adds a node in the middle of every edge of the first-order solids; second-order elements and
 /// beams are unchanged.
-pub fn promoted(mesh: &Mesh) -> Promoted {
+pub(crate) fn promoted(mesh: &Mesh) -> Promoted {
     let mut this = Promoted { mesh: mesh.clone(), ends: Vec::new() };
     // Edges of second-order elements already have their node.
     let mut middle: HashMap<[u32; 2], u32> = HashMap::new();

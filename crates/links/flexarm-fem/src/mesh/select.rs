@@ -1,4 +1,9 @@
 //! Selection of the nodes of an interface: by set, by position, or both.
+//!
+//! Start at [`select`]. Positions in m, mesh axes; lengths of the selector in the unit of the mesh
+//! file.
+//!
+//! Not here: text and tables of a selector (`selector`), ties ([`crate::reduction::Boundary`]).
 
 use std::cmp::Reverse;
 

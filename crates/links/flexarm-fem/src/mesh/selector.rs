@@ -1,4 +1,8 @@
 //! Node selection by the user: as text on the command line, as text or table in a file.
+//!
+//! Start at [`NodeSelector`]. Lengths are in the unit of the mesh file.
+//!
+//! Not here: which nodes of a mesh it selects (`select`).
 
 use std::fmt;
 use std::str::FromStr;

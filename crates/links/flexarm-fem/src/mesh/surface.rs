@@ -1,4 +1,8 @@
 //! Skin of a mesh: faces of volume elements that belong to one element only.
+//!
+//! Start at [`skin`]. Corners counter-clockwise seen from outside, node indices of the mesh.
+//!
+//! Not here: the nodes of the skin with their normals (`surface_nodes`), pictures.
 
 use super::faces::{face_corners, face_nodes};
 use super::{ElementBlock, Mesh};

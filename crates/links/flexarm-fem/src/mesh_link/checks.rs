@@ -1,5 +1,8 @@
 //! Checks of a finished reduction against the mesh, and of the size of the link.
+//!
+//! Start at [`gate`]. Link axes, SI. Not here: limits and messages ([`crate::mesh_gate`]).
 
+use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use crate::chain::Chain;
@@ -100,7 +103,7 @@ pub fn condensed_body(element: &Superelement) -> RigidPart {
     let com = Vector3::new(M[(1, 5)] - M[(2, 4)], M[(2, 3)] - M[(0, 5)], M[(0, 4)] - M[(1, 3)]) / (2.0 * mass);
     let c = com.cross_matrix();
     let inertia = M.fixed_view::<3, 3>(3, 3) + c * c * mass;
-    RigidPart { mass, com, inertia: (inertia + inertia.transpose()) * 0.5 }
+    RigidPart { mass, com, inertia: symmetric_part(&inertia) }
 }
 
 /// Warnings about a size, mass or frequency that is implausible for a robot link, usually wrong

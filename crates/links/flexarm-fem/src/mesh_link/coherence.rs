@@ -1,4 +1,7 @@
 //! Whether a mesh holds together: parts, misfits, hinges, cracks, and free interfaces.
+//!
+//! Turns what [`crate::mesh`] finds into errors and warnings with a remedy. Not here: the search
+//! itself.
 
 use crate::mesh::{Bodies, Mesh, Misfit, Part, coincident, connected_parts, misfits};
 use crate::mesh_link::LinkPlan;

@@ -1,4 +1,12 @@
 //! Modal link of a uniform beam, computed with beam elements between its two ends.
+//!
+//! Start at [`BeamLink::modal`]. The road is that of a mesh: elements, condensation, integrals.
+//! Link axes.
+//!
+//! Not here: the beam element ([`crate::beam`]), the link of two rigid parts
+//! ([`BeamLink::reduce`]).
+
+use std::fmt::Display;
 
 use super::{ModalLink, ModalOptions, ModalSource};
 use crate::beam_link::BeamLink;
@@ -41,7 +49,7 @@ impl BeamLink {
     /// # Errors
     /// [`FemError::OutOfRange`] for impossible dimensions, materials and masses, too few elements
     /// and too many modes, [`FemError::Missing`] for a section without shear stiffness in
-    /// Timoshenko's theory.
+    /// Timoshenko's theory, [`FemError::BeamElements`] if rounding makes the elements singular.
     pub fn modal_with(&self, options: &ModalOptions) -> Result<ModalLink, FemError> {
         let reduced = self.reduce()?;
         let m = options.elements;
@@ -60,20 +68,16 @@ impl BeamLink {
 
         let mesh = self.elements(m)?;
         let assembly = AssemblyOptions::default();
-        let refused = |what: &str| FemError::OutOfRange {
-            what: format!("{what} of the beam elements"),
-            found: f64::NAN,
-            allowed: "numbers that can be solved: is the section possible at this length?".into(),
-        };
-        let model = FeModel::assemble(&mesh, &assembly).map_err(|_| refused("assembly"))?;
+        let refused = |step, cause: &dyn Display| FemError::BeamElements { step, cause: cause.to_string() };
+        let model = FeModel::assemble(&mesh, &assembly).map_err(|cause| refused("assembly", &cause))?;
         let interface =
             |name: &str, X_LI, node| Interface { name: name.into(), X_LI, nodes: vec![node], tie: Tie::Rigid };
         let interfaces = [interface("A", self.X_LA, 0), interface("B", self.X_LB, m as u32)];
         let condensation = Condensation::new(&model, &interfaces, CondensationOptions::default())
-            .map_err(|_| refused("condensation"))?;
+            .map_err(|cause| refused("condensation", &cause))?;
         let fixed_modes = condensation
             .fixed_modes(ModesWanted::Count(options.modes))
-            .map_err(|_| refused("fixed-interface modes"))?;
+            .map_err(|cause| refused("fixed-interface modes", &cause))?;
         let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
         let mut superelement = condensation.superelement(interfaces.iter().map(frame).collect(), &fixed_modes);
         // The closed-form stiffness keeps the last digits that condensation loses.

@@ -40,10 +40,11 @@
 //! Mech. Eng.* 14, for moments; Wallrapp & Schwertassek (1991), *Int. J. Numer. Meth. Eng.* 32, for
 //! the unit loads of the floating frame.
 
+use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, Matrix3, Vector3};
 
 use super::source::{BeamElement, ModalSource};
-use super::{GeometricStiffness, axial, symmetric};
+use super::{GeometricStiffness, axial};
 use crate::beam::gauss4;
 use crate::element::{Purpose, for_each_point, lame};
 use crate::reduction::Tie;
@@ -107,7 +108,7 @@ pub(super) fn geometric_stiffness(
     }
     add_ties(source, &on_mesh, &mut G);
 
-    let mut G = G.into_iter().map(|G| symmetric(&G));
+    let mut G = G.into_iter().map(|G| symmetric_part(&G));
     let mut next = || G.next().unwrap_or_else(|| DMatrix::zeros(n, n));
     GeometricStiffness {
         acceleration: std::array::from_fn(|_| next()),

@@ -38,7 +38,7 @@ mod tests;
 mod transform;
 
 pub use flexarm_spatial::GeometricStiffness;
-use flexarm_spatial::Pose;
+use flexarm_spatial::{Pose, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 
 use crate::error::FemError;
@@ -187,7 +187,7 @@ impl ModalLink {
         let C = spd_inverse(&self.K).ok_or(loose)?;
         let Phi = DMatrix::from_column_slice(6, self.coordinates(), at.Phi.as_slice());
         let C = &Phi * C * Phi.transpose();
-        Ok(flexarm_spatial::symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
+        Ok(symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
     }
 
     /// Whether mass and stiffness are positive definite, so that all frequencies with A clamped are
@@ -217,11 +217,5 @@ pub fn axial(A: &Matrix3<f64>) -> Vector3<f64> {
 
 /// Inertia about the origin for second moments `∫ s sᵀ dm`.
 pub(crate) fn inertia_of(S: &Matrix3<f64>) -> Matrix3<f64> {
-    let J = Matrix3::identity() * S.trace() - S;
-    (J + J.transpose()) * 0.5
-}
-
-/// `(A + Aᵀ)/2`.
-pub fn symmetric(A: &DMatrix<f64>) -> DMatrix<f64> {
-    (A + A.transpose()) * 0.5
+    symmetric_part(&(Matrix3::identity() * S.trace() - S))
 }

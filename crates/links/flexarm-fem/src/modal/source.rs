@@ -9,9 +9,10 @@
 //! for solids of any shape, and for beams with four Gauss points for the cubic shapes of
 //! [`Beam`](crate::Beam).
 
+use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
 
-use super::{ModalInterface, ModalLink, axial, geometric, inertia_of, symmetric};
+use super::{ModalInterface, ModalLink, axial, geometric, inertia_of};
 use crate::beam::{Beam, gauss4};
 use crate::element::Quadrature;
 use crate::error::COMPONENTS;
@@ -116,7 +117,7 @@ impl ModalSource<'_> {
                 sums.N[k * n + l] = sums.N[l * n + k].transpose();
             }
         }
-        let block = |A: &DMatrix<f64>| symmetric(&A.view((6, 6), (n, n)).into_owned());
+        let block = |A: &DMatrix<f64>| symmetric_part(&A.view((6, 6), (n, n)).into_owned());
         let C_r: Vec<_> = sums.P.iter().map(axial).collect();
         ModalLink {
             name: name.into(),

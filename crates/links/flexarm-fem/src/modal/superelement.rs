@@ -9,10 +9,11 @@
 //! are exact. The distribution of mass inside is lost: only the skew part of `P_k` follows, from
 //! `C_r`; its symmetric part and all `N_kl`, the second-order terms, are unknown and set to zero.
 
+use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Vector3};
 
 use super::source::{labels, unit_shapes};
-use super::{ModalInterface, ModalLink, symmetric};
+use super::{ModalInterface, ModalLink};
 use crate::error::FemError;
 use crate::mesh_link::{condensed_body, rigid_motions_about};
 use crate::reduction::Superelement;
@@ -31,7 +32,7 @@ impl ModalLink {
         }
         condensed_body(element).check("the link")?;
         let (all, n) = (element.K.nrows(), element.K.nrows() - 6);
-        let block = |A: &DMatrix<f64>| symmetric(&A.view((6, 6), (n, n)).into_owned());
+        let block = |A: &DMatrix<f64>| symmetric_part(&A.view((6, 6), (n, n)).into_owned());
         let (K, M) = (block(&element.K), block(&element.M));
         if super::transform::eigenpairs(&K, &M).is_none() {
             let help = "they must be positive definite with the proximal interface held";

@@ -430,7 +430,7 @@ fn buckling_load(K: &DMatrix<f64>, G: &DMatrix<f64>) -> f64 {
     let L = K.clone().cholesky().unwrap().l();
     let A = L.solve_lower_triangular(G).unwrap();
     let A = L.solve_lower_triangular(&A.transpose()).unwrap();
-    let eigenvalues = nalgebra::SymmetricEigen::new(symmetric(&A)).eigenvalues;
+    let eigenvalues = nalgebra::SymmetricEigen::new(symmetric_part(&A)).eigenvalues;
     -1.0 / eigenvalues.min()
 }
 
@@ -485,7 +485,7 @@ fn a_spinning_beam_stiffens_as_in_the_literature() {
         let n = link.coordinates();
         let softening = DMatrix::from_fn(n, n, |k, l| link.N[k * n + l][(2, 2)] - link.N[k * n + l].trace());
         let K = &link.K + (&G.centrifugal[2] + softening) * (spin * spin);
-        let pairs = transform::eigenpairs(&symmetric(&K), &link.M).unwrap();
+        let pairs = transform::eigenpairs(&symmetric_part(&K), &link.M).unwrap();
         // The mode with displacement of B along z.
         let flap = (0..n).find(|j| pairs.Phi[(2, *j)].abs() > 1e-6 * pairs.Phi.column(*j).amax()).unwrap();
         let error = pairs.omega[flap] / truth - 1.0;

@@ -1,6 +1,11 @@
 //! Changes of coordinates of a modal link: orthogonalised, truncated, other frame, other axes.
+//!
+//! Start at [`ModalLink::orthogonalised`] and [`ModalLink::truncated`]. Link axes and Lo as in the module
+//! above; coordinates change by `η = V η'`, matrices by `Vᵀ A V`.
+//!
+//! Not here: integrals over a mesh ([`super::ModalSource`]).
 
-use flexarm_spatial::Pose;
+use flexarm_spatial::{Pose, symmetric_part};
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
 use super::PRODUCTS;
@@ -249,7 +254,7 @@ impl ModalLink {
         Self {
             interfaces: self.interfaces.iter().map(interface).collect(),
             first_moment: r * self.first_moment,
-            inertia: (inertia + inertia.transpose()) * 0.5,
+            inertia: symmetric_part(&inertia),
             C_t: r * &self.C_t,
             C_r: r * &self.C_r,
             P: self.P.iter().map(both).collect(),
@@ -263,7 +268,7 @@ impl ModalLink {
     /// Changes coordinates by `η = V η'`; stiffness and mass transform as quadratic forms.
     pub(super) fn in_coordinates(&self, V: &DMatrix<f64>) -> Self {
         let (n, m) = V.shape();
-        let form = |A: &DMatrix<f64>| super::symmetric(&(V.transpose() * A * V));
+        let form = |A: &DMatrix<f64>| symmetric_part(&(V.transpose() * A * V));
         // N_ij' = Σ V_ki V_lj N_kl, for each entry of the 3×3.
         let mut N = vec![Matrix3::zeros(); m * m];
         for (a, b) in (0..9).map(|e| (e / 3, e % 3)) {

@@ -1,4 +1,9 @@
 //! Mass of a model: one number per node pair for solids, a general sparse part for beams.
+//!
+//! Rows are DoF, kg, kg·m, kg·m². Start at [`MassMatrix::product`].
+//!
+//! Not here: masses of elements ([`crate::element`], [`crate::beam`]), mass properties of a body
+//! ([`crate::cut`]).
 
 use flexarm_spatial::Real;
 use nalgebra::DMatrix;
@@ -64,7 +69,7 @@ impl MassMatrix {
     ///
     /// # Panics
     /// If `X` does not have [`Self::size`] rows, or `Y` another shape.
-    pub fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
+    pub(crate) fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
         assert!(X.nrows() == self.size && Y.shape() == X.shape(), "mass of {} rows times {:?}", self.size, X.shape());
         by_blocks(X, Y, |x, y| self.block_product(x, y));
     }
@@ -73,7 +78,7 @@ impl MassMatrix {
     ///
     /// # Panics
     /// If the numbers of rows do not match.
-    pub fn block_product(&self, X: &Block, Y: &mut Block) {
+    pub(crate) fn block_product(&self, X: &Block, Y: &mut Block) {
         assert!(X.rows.len() == self.size && Y.rows.len() == self.size, "mass of {} rows times another", self.size);
         Y.rows.fill(Row::ZERO);
         Y.width = X.width;

@@ -1,4 +1,14 @@
 //! Interfaces of a link and their ties to the mesh.
+//!
+//! ```text
+//! rigid:         u_node = u_I + θ_I × (x_node - x_I)                           rows of B
+//! distributing:  θ_I = J⁻¹ Σ r × u,  u_I = mean u + θ_I × (x_I - c),  r = x - c     rows of G
+//! ```
+//! with c the mean of the nodes and `J = Σ (r² 1 - r rᵀ)`. Start at [`Boundary::tie`]. Mesh axes; the six
+//! columns of an interface are `ux uy uz rx ry rz` of its origin.
+//!
+//! Not here: the selection of the nodes ([`crate::mesh::select`](crate::mesh::select())), the solution
+//! ([`super::Condensation`]).
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};

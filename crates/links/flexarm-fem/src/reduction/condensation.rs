@@ -1,7 +1,17 @@
 //! Factorised model with its boundary: static shapes, and modes under three kinds of support.
+//!
+//! ```text
+//! K_ii = L Lᵀ,   T = [-K_ii⁻¹ K_ib; 1],   K_g = Tᵀ K T,   M_g = Tᵀ M T
+//! K u + Gᵀ λ = F,  G u = g     distributing ties: λ from the Schur complement G K_ii⁻¹ Gᵀ
+//! ```
+//! Start at [`Condensation::new`]. Mesh axes; six boundary columns per interface, the first interface
+//! first; tall matrices have one row per DoF of the model.
+//!
+//! Not here: ties ([`super::Boundary`]), the factor and the eigensolver ([`crate::sparse`]).
 
 mod modes;
 
+use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, DVector, SymmetricEigen, Vector3};
 
 use super::boundary::{Boundary, Interface, TieError};
@@ -206,12 +216,12 @@ impl<'m> Condensation<'m> {
             let mut force = forces.row_mut(*column);
             force -= row;
         }
-        self.K_g = symmetric(gram(&self.T, &KT));
+        self.K_g = symmetric_part(&gram(&self.T, &KT));
         let d = self.K_g.diagonal();
         let place = |(i, j): (usize, usize)| (forces[(i, j)] - forces[(j, i)]).abs() / (d[i] * d[j]).sqrt();
         let pairs = (0..columns).flat_map(|i| (0..i).map(move |j| (i, j)));
         self.asymmetry = worst(pairs.map(place));
-        self.M_g = symmetric(gram(&self.T, &self.model.M.product(&self.T)));
+        self.M_g = symmetric_part(&gram(&self.T, &self.model.M.product(&self.T)));
     }
 
     fn saddle_of(&self, rigid: Option<DMatrix<f64>>) -> Option<Saddle> {
@@ -365,7 +375,7 @@ impl<'m> Condensation<'m> {
     }
 
     /// Replaces nodal forces by the displacements of all DoF, with the first interface clamped.
-    pub fn solve_held(&self, F: &mut DMatrix<f64>) {
+    pub(crate) fn solve_held(&self, F: &mut DMatrix<f64>) {
         for first in (0..F.ncols()).step_by(WIDTH) {
             let mut block = Block::of_columns(F, first, WIDTH.min(F.ncols() - first));
             self.solve_held_block(&mut block);
@@ -443,7 +453,7 @@ impl<'m> Condensation<'m> {
         }
         let Q = y.clone();
         self.factor.solve_block(&mut y);
-        largest * SymmetricEigen::new(symmetric(Q.gram(&y))).eigenvalues.max()
+        largest * SymmetricEigen::new(symmetric_part(&Q.gram(&y))).eigenvalues.max()
     }
 
     /// Figures of the linear algebra.
@@ -508,11 +518,6 @@ fn free_direction(K: &DMatrix<f64>) -> Option<(usize, Direction)> {
     Some((most, Direction::new(motion.rows(6 * most, 6).iter().copied())))
 }
 
-fn symmetric(A: DMatrix<f64>) -> DMatrix<f64> {
-    let B = A.transpose();
-    (A + B) * 0.5
-}
-
 /// Inverse of a small SPD matrix with rows of different units, scaled to a unit diagonal first.
 pub(crate) fn spd_inverse(K: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = K.diagonal().map(|k| 1.0 / k.sqrt());
@@ -521,5 +526,5 @@ pub(crate) fn spd_inverse(K: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return None;
     }
     let inverse = scaled.cholesky()?.inverse();
-    Some(symmetric(DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j])))
+    Some(symmetric_part(&DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j])))
 }

@@ -1,8 +1,8 @@
 //! Blocks of up to eight tall columns, the format for right-hand sides, mass products and bases.
 //!
-//! A row is one cache line. An entry of a matrix that is read once serves all eight
-//! columns, and their numbers go through the vector units together. Sums run over the rows in
-//! order, the same on every machine.
+//! A row is one cache line. An entry of a matrix that is read once serves all eight columns, and their
+//! numbers go through the vector units together. Sums run over the rows in order, the same on every
+//! machine. Not here: products of tall nalgebra matrices (`dense`).
 
 use flexarm_spatial::Real;
 use nalgebra::DMatrix;
@@ -10,7 +10,7 @@ use nalgebra::DMatrix;
 use super::vectors::{Wide, Work, quickly};
 
 /// Number of columns of a block.
-pub const WIDTH: usize = 8;
+pub(crate) const WIDTH: usize = 8;
 
 /// Number of rows processed together so that they stay in the first-level cache.
 const PANEL: usize = 256;
@@ -18,11 +18,11 @@ const PANEL: usize = 256;
 /// One row of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(C, align(64))]
-pub struct Row(pub [f64; WIDTH]);
+pub(crate) struct Row(pub [f64; WIDTH]);
 
 impl Row {
     /// Row of zeros.
-    pub const ZERO: Self = Self([0.0; WIDTH]);
+    pub(crate) const ZERO: Self = Self([0.0; WIDTH]);
 }
 
 /// Small matrix over the columns of two blocks, by rows.
@@ -30,7 +30,7 @@ pub(super) type Small = [Row; WIDTH];
 
 /// Tall columns; those from `width` on are zero.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Block {
+pub(crate) struct Block {
     /// Rows of all columns.
     pub rows: Vec<Row>,
     /// Number of columns in use.
@@ -42,20 +42,20 @@ impl Block {
     ///
     /// # Panics
     /// If `width` exceeds [`WIDTH`].
-    pub fn zeros(rows: usize, width: usize) -> Self {
+    pub(crate) fn zeros(rows: usize, width: usize) -> Self {
         assert!(width <= WIDTH, "a block has at most {WIDTH} columns");
         Self { rows: vec![Row::ZERO; rows], width }
     }
 
     /// Copies the columns `first..first + width` of a tall matrix.
-    pub fn of_columns(X: &DMatrix<f64>, first: usize, width: usize) -> Self {
+    pub(crate) fn of_columns(X: &DMatrix<f64>, first: usize, width: usize) -> Self {
         let mut block = Self::zeros(X.nrows(), width);
         block.set_columns(X, first);
         block
     }
 
     /// Copies columns of a tall matrix, from `first` on, into the columns in use.
-    pub fn set_columns(&mut self, X: &DMatrix<f64>, first: usize) {
+    pub(crate) fn set_columns(&mut self, X: &DMatrix<f64>, first: usize) {
         for k in 0..self.width {
             let column = &X.as_slice()[(first + k) * X.nrows()..][..X.nrows()];
             self.rows.iter_mut().zip(column).for_each(|(row, x)| row.0[k] = *x);
@@ -63,7 +63,7 @@ impl Block {
     }
 
     /// Copies the columns in use into a tall matrix, from column `first` on.
-    pub fn put_columns(&self, X: &mut DMatrix<f64>, first: usize) {
+    pub(crate) fn put_columns(&self, X: &mut DMatrix<f64>, first: usize) {
         let n = X.nrows();
         for k in 0..self.width {
             let column = &mut X.as_mut_slice()[(first + k) * n..][..n];
@@ -71,25 +71,18 @@ impl Block {
         }
     }
 
-    /// Returns the columns in use as a tall matrix.
-    pub fn to_columns(&self) -> DMatrix<f64> {
-        let mut X = DMatrix::zeros(self.rows.len(), self.width);
-        self.put_columns(&mut X, 0);
-        X
-    }
-
     /// Computes `selfᵀ other`.
-    pub fn gram(&self, other: &Self) -> DMatrix<f64> {
+    pub(crate) fn gram(&self, other: &Self) -> DMatrix<f64> {
         grams(std::slice::from_ref(self), other)
     }
 
     /// Computes `self -= other C`.
-    pub fn subtract_product(&mut self, other: &Self, C: &DMatrix<f64>) {
+    pub(crate) fn subtract_product(&mut self, other: &Self, C: &DMatrix<f64>) {
         subtract_products(self, std::slice::from_ref(other), C);
     }
 
     /// Computes `self <- self C`, with the number of columns of C.
-    pub fn multiply(&mut self, C: &DMatrix<f64>) {
+    pub(crate) fn multiply(&mut self, C: &DMatrix<f64>) {
         let C_small = small(C, 0, self.width);
         quickly(Multiply { X: &mut self.rows, C: &C_small });
         self.width = C.ncols();
@@ -263,6 +256,12 @@ impl Work for Multiply<'_> {
 mod tests {
     use super::*;
 
+    fn columns(X: &Block) -> DMatrix<f64> {
+        let mut columns = DMatrix::zeros(X.rows.len(), X.width);
+        X.put_columns(&mut columns, 0);
+        columns
+    }
+
     #[test]
     fn products_of_blocks_are_those_of_their_matrices() {
         let n = 2 * PANEL + 17;
@@ -276,15 +275,15 @@ mod tests {
         assert!((&C - AB.transpose() * &X).amax() < 1e-11); // measured 2e-13
         subtract_products(&mut x, &basis, &C);
         let expected = &X - &AB * &C;
-        assert!((x.to_columns() - &expected).amax() < 1e-12 * expected.amax().max(1e3));
+        assert!((columns(&x) - &expected).amax() < 1e-12 * expected.amax().max(1e3));
         assert!(x.rows.iter().all(|row| row.0[6..] == [0.0; 2]));
         let mut blocks = basis.to_vec();
         combine(&mut blocks, &[C.clone(), C.columns(1, 3).into_owned(), C.columns(2, 1).into_owned()]);
         assert_eq!(blocks.iter().map(|V| V.width).collect::<Vec<_>>(), [6, 3, 1]);
-        assert!((blocks[0].to_columns() - &AB * &C).amax() < 1e-12 * (&AB * &C).amax());
-        assert!((blocks[2].to_columns() - &AB * C.columns(2, 1)).amax() < 1e-12 * (&AB * &C).amax());
+        assert!((columns(&blocks[0]) - &AB * &C).amax() < 1e-12 * (&AB * &C).amax());
+        assert!((columns(&blocks[2]) - &AB * C.columns(2, 1)).amax() < 1e-12 * (&AB * &C).amax());
         x.multiply(&C.transpose().columns(0, 5).into_owned());
         let expected = expected * C.transpose().columns(0, 5);
-        assert!((x.to_columns() - &expected).amax() < 1e-13 * expected.amax());
+        assert!((columns(&x) - &expected).amax() < 1e-13 * expected.amax());
     }
 }

@@ -1,4 +1,8 @@
 //! Sparse Cholesky factor: ordered, factorised once, used for many right-hand sides.
+//!
+//! Start at [`Cholesky::new`]. Factor and substitution are supernodal ones of faer.
+//!
+//! Not here: nested dissection (`dissection`), which unknowns there are ([`crate::reduction`]).
 
 use std::fmt;
 
@@ -38,7 +42,7 @@ pub struct FactorFigures {
 /// Errors of a factorisation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
-pub enum NotPositiveDefinite {
+pub(crate) enum NotPositiveDefinite {
     /// A pivot is not positive.
     #[error("the matrix is not positive definite (pivot of unknown {unknown})")]
     Pivot {
@@ -54,7 +58,7 @@ pub enum NotPositiveDefinite {
 }
 
 /// Factor `P K Pᵀ = L Lᵀ` of a sparse symmetric positive definite matrix.
-pub struct Cholesky {
+pub(crate) struct Cholesky {
     symbolic: SymbolicCholesky<u32>,
     /// Entries of the factor, from `start` on.
     values: Vec<f64>,
@@ -78,7 +82,7 @@ impl Cholesky {
     ///
     /// # Errors
     /// [`NotPositiveDefinite`], with the unknown of the failing pivot.
-    pub fn new(K: &SparseSymmetric, ordering: Ordering) -> Result<Self, NotPositiveDefinite> {
+    pub(crate) fn new(K: &SparseSymmetric, ordering: Ordering) -> Result<Self, NotPositiveDefinite> {
         let (n, pattern) = (K.size(), K.pattern());
         let places = SymbolicSparseColMatRef::new_checked(n, n, &pattern.starts, None, &pattern.rows);
         let (symbolic, ordering) = analyse(places, pattern, ordering)?;
@@ -111,7 +115,7 @@ impl Cholesky {
     }
 
     /// Size and cost of the factor.
-    pub fn figures(&self) -> FactorFigures {
+    pub(crate) fn figures(&self) -> FactorFigures {
         self.figures
     }
 
@@ -119,7 +123,7 @@ impl Cholesky {
     ///
     /// Near rounding (1e-16 to 1e-12) if the matrix is singular and only passed because of the sign
     /// of a rounding error.
-    pub fn smallest_pivot(&self) -> (f64, usize) {
+    pub(crate) fn smallest_pivot(&self) -> (f64, usize) {
         self.smallest_pivot
     }
 
@@ -127,7 +131,7 @@ impl Cholesky {
     ///
     /// # Panics
     /// If the number of rows of `B` is wrong.
-    pub fn solve_in_place(&self, B: &mut DMatrix<f64>) {
+    pub(crate) fn solve_in_place(&self, B: &mut DMatrix<f64>) {
         assert_eq!(B.nrows(), self.figures.size, "right-hand side of another size");
         for first in (0..B.ncols()).step_by(WIDTH) {
             let mut block = Block::of_columns(B, first, WIDTH.min(B.ncols() - first));
@@ -140,7 +144,7 @@ impl Cholesky {
     ///
     /// # Panics
     /// If the number of rows of `B` is wrong.
-    pub fn solve_block(&self, B: &mut Block) {
+    pub(crate) fn solve_block(&self, B: &mut Block) {
         assert_eq!(B.rows.len(), self.figures.size, "right-hand side of another size");
         self.solve_rows(&mut B.rows, None);
     }

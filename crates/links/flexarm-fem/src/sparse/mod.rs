@@ -7,7 +7,7 @@
 //!                                 smallest_modes: shift-invert block Lanczos on any operator (K, M)
 //! ```
 //! Only the lower triangle is stored, by columns. Tall results are nalgebra matrices, one column
-//! per right-hand side; operations on a factor, matrix or basis take them as [`Block`]s, row by
+//! per right-hand side; operations on a factor, matrix or basis take them as `Block`s, row by
 //! row.
 //!
 //! Not here: the meaning of the rows. Degrees of freedom, ties and boundaries belong to
@@ -23,13 +23,13 @@ mod registers;
 mod symmetric;
 mod vectors;
 
-pub use block::{Block, WIDTH};
-pub use cholesky::{Cholesky, FactorFigures, NotPositiveDefinite};
-pub use lanczos::{Modes, ModesError, ModesWanted, Pencil, Released, modes_of_two_supports, smallest_modes};
+pub use cholesky::FactorFigures;
+pub use lanczos::{Modes, ModesError, ModesWanted};
 pub use ordering::Ordering;
 pub use symmetric::{Pattern, SparseSymmetric};
 
-pub(crate) use block::{Row, grams, subtract_products};
+pub(crate) use block::{Block, Row, WIDTH, grams, subtract_products};
+pub(crate) use cholesky::{Cholesky, NotPositiveDefinite};
 pub(crate) use dense::{add_product, gram};
-pub(crate) use lanczos::orthonormalising;
+pub(crate) use lanczos::{Pencil, orthonormalising, smallest_modes};
 pub(crate) use vectors::{Wide, Work, quickly};

@@ -1,4 +1,9 @@
 //! Symmetric sparse matrix: lower triangle by columns, pattern shared between stiffness and mass.
+//!
+//! Start at [`SparseSymmetric::from_triplets`] or [`SparseSymmetric::zeros`], then
+//! [`SparseSymmetric::product`]. Indices are 32 bit.
+//!
+//! Not here: mass of solids, which is one number per pair of nodes ([`crate::model::MassMatrix`]).
 
 use std::sync::Arc;
 
@@ -127,7 +132,7 @@ impl SparseSymmetric {
     ///
     /// # Panics
     /// If the shapes do not match.
-    pub fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
+    pub(crate) fn product_into(&self, X: &DMatrix<f64>, Y: &mut DMatrix<f64>) {
         let n = self.size();
         assert!(
             X.nrows() == n && Y.shape() == X.shape(),
@@ -168,13 +173,13 @@ impl SparseSymmetric {
     ///
     /// # Panics
     /// If the shapes do not match.
-    pub fn add_block_product(&self, X: &Block, Y: &mut Block) {
+    pub(crate) fn add_block_product(&self, X: &Block, Y: &mut Block) {
         assert!(X.rows.len() == self.size() && Y.rows.len() == self.size(), "blocks of another size");
         quickly(BlockProduct { A: self, X: &X.rows, Y: &mut Y.rows });
     }
 
     /// Extracts the rows and columns in `keep` (ascending), in that order.
-    pub fn submatrix(&self, keep: &[u32]) -> Self {
+    pub(crate) fn submatrix(&self, keep: &[u32]) -> Self {
         let mut position = vec![u32::MAX; self.size()];
         for (new, old) in keep.iter().enumerate() {
             position[*old as usize] = new as u32;

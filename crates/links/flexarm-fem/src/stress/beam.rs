@@ -9,6 +9,9 @@
 //! ```
 //! The places are points on the outline of the section at planes along the beam. What the section
 //! forces do not contain is not there: stress concentration at joints, warping, local bending.
+//!
+//! Start at [`BeamLink::stress_fields`]. x along the beam from E, m; wrenches in link axes. Not here: the
+//! outline (`section_outline`), meshes (`fields`).
 
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3, Vector6};
 
@@ -42,6 +45,7 @@ impl BeamLink {
     /// As [`BeamLink::reduce`]; [`FemError::Missing`] for a section that is given by its stiffness,
     /// [`FemError::OutOfRange`] for a beam whose ends are in the order from B to A.
     pub fn stress_fields(&self, joints: &[ElasticSplit], parts: &[RigidPart]) -> Result<StressFields, FemError> {
+        // Geometry of the beam and its section.
         let axis = self.X_LE.rotation.matrix().column(0).into_owned();
         let advance = axis.dot(&(self.X_LB.translation.vector - self.X_LA.translation.vector));
         positive("advance of the beam from A to B (m)", advance)?;
@@ -53,6 +57,7 @@ impl BeamLink {
             what: "the compliance of the beam",
             help: "its stiffness is singular in rounding: check its dimensions",
         })?;
+        // Section forces F(x) at each plane, in beam axes; from them the stress at each point.
         let spread = self.spread(joints, parts);
         let columns = 6 + INERTIA_LOADS;
         let count = outline.len();
@@ -74,6 +79,7 @@ impl BeamLink {
                     material: 0,
                     from_tie: f64::INFINITY,
                 });
+                // σ = R [σ_x τ; τ 0] Rᵀ: normal stress along x, shear stress along the outline.
                 for (j, F) in section.iter().enumerate() {
                     let [normal, shear] = stress_at(point, [own.A, own.I_y, own.I_z], F);
                     let [t_y, t_z] = point.tangent.map(|t| shear * t);

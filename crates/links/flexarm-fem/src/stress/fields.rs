@@ -1,4 +1,9 @@
 //! Stress of a link under unit loads and in unit modes, at the nodes of its surface.
+//!
+//! Start at [`StressFields`], which states the superposition. Link axes, Pa.
+//!
+//! Not here: stress of one set of displacements ([`super::StressRecovery`]), superposition over a motion
+//! ([`super::StressMap`]), the file (`file`).
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Vector3};

@@ -1,4 +1,9 @@
 //! Stress at integration points and at nodes.
+//!
+//! Start at [`StressRecovery::at_nodes`]; the method is in the module above. Pa, mesh axes,
+//! `xx yy zz xy yz zx`; displacements over all DoF of the model, one column per load.
+//!
+//! Not here: unit loads and modes of a link ([`super::StressFields`]), beams (`beam`).
 
 use nalgebra::{DMatrix, Matrix3, SMatrix, Vector3};
 
@@ -14,7 +19,7 @@ use crate::model::FeModel;
 pub struct NodalPlace {
     /// Index of the node.
     pub node: u32,
-    /// Index of the material in [`StressRecovery::distinct_materials`].
+    /// Index of the material in `StressRecovery::distinct_materials`.
     pub material: u32,
 }
 
@@ -135,7 +140,7 @@ impl StressRecovery<'_> {
     }
 
     /// Returns the materials of the regions without repetition.
-    pub fn distinct_materials(&self) -> Vec<Material> {
+    pub(crate) fn distinct_materials(&self) -> Vec<Material> {
         let mut distinct: Vec<Material> = Vec::new();
         for material in self.materials {
             if !distinct.contains(material) {

@@ -16,10 +16,10 @@
 //!
 //! Source: Wallrapp (1994), *Mech. Struct. & Mach.* 22.
 
-use flexarm_spatial::Pose;
+use flexarm_spatial::{Pose, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Rotation3, Translation3, Vector3};
 
-use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS, symmetric};
+use flexarm_fem::modal::{GeometricStiffness, ModalInterface, ModalLink, PRODUCTS};
 
 use super::{GyroLayout, OeOrder, Sid, SidMatrix, SidNode, sizes_of};
 use crate::FeFileError;
@@ -137,8 +137,8 @@ fn of_node(name: &str, sid: &Sid, A: usize) -> Result<ModalLink, FeFileError> {
         C_r,
         P,
         N,
-        M: symmetric(&sid.Me.m0()),
-        K: symmetric(&sid.Ke.m0()),
+        M: symmetric_part(&sid.Me.m0()),
+        K: symmetric_part(&sid.Ke.m0()),
         geometric,
         labels: sid.modes.clone(),
         X_LA: frame(name, &sid.nodes[A])?,
@@ -184,7 +184,7 @@ fn by_loads<const LOADS: usize>(sid: &Sid, name: &str, from: usize, all: usize) 
         return None;
     }
     let dense = block.m0();
-    Some(std::array::from_fn(|i| symmetric(&dense.columns((from + i) * n, n).into_owned())))
+    Some(std::array::from_fn(|i| symmetric_part(&dense.columns((from + i) * n, n).into_owned())))
 }
 
 /// Geometric stiffness from the blocks `K0t` to `K0F`, or from the first-order parts of the
@@ -212,14 +212,14 @@ fn geometric(sid: &Sid, A: usize) -> Option<GeometricStiffness> {
             for l in 0..n {
                 G.set_column(l, &matrix.m1(l).column(axis));
             }
-            symmetric(&G)
+            symmetric_part(&G)
         };
         let of_node = |shapes: &SidMatrix, axis: usize| {
             let mut G = DMatrix::zeros(n, n);
             for l in 0..n {
                 G.set_column(l, &-shapes.m1(l).row(axis).transpose());
             }
-            symmetric(&G)
+            symmetric_part(&G)
         };
         let of_nodes = |node: &&SidNode| {
             std::array::from_fn(|i| if i < 3 { of_node(&node.phi, i) } else { of_node(&node.psi, i - 3) })

@@ -16,7 +16,7 @@ use crate::mesh::read::ReadOptions;
 use crate::mesh::source::Source;
 use crate::number::shown;
 use flexarm_fem::mesh::{ElementKind, Mesh, Region};
-use flexarm_fem::spelling::listed;
+use flexarm_settings::listed;
 
 /// Dimension and tag of a physical group; tag 0 means no group.
 type GroupKey = (u8, i64);

@@ -16,7 +16,7 @@ use crate::mesh::read::ReadOptions;
 use crate::number::unsigned;
 use flexarm_fem::beam::BeamTheory;
 use flexarm_fem::mesh::{ElementKind, Mesh, Region, face_nodes};
-use flexarm_fem::spelling::listed;
+use flexarm_settings::listed;
 
 const NONE: u32 = u32::MAX;
 

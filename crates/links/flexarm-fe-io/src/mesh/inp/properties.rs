@@ -16,8 +16,8 @@ use flexarm_fem::beam::BeamTheory;
 use flexarm_fem::material::Material;
 use flexarm_fem::mesh::BeamProperties;
 use flexarm_fem::section::Section;
-use flexarm_fem::spelling::listed;
 use flexarm_fem::units::UnitSystem;
+use flexarm_settings::listed;
 
 /// `*MATERIAL` with its sub-cards; SI.
 pub(super) struct MaterialCard {

@@ -11,7 +11,7 @@ use crate::FeFileError;
 use crate::mesh::ids::IdIndex;
 use crate::mesh::source::Source;
 use crate::number::{shown, unsigned};
-use flexarm_fem::spelling::listed;
+use flexarm_settings::listed;
 
 /// Limit for the growth of sets by nesting and generation, proportional to the size of the file, so
 /// that a small file cannot cause endless work.
