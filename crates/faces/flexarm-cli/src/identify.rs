@@ -114,7 +114,7 @@ pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, 
                 output: folder.path(),
                 overwrite: args.force,
             };
-            // Without a terminal to draw on, a line tells now and then how far the fit is.
+            // Output that is no terminal gets a line every few seconds instead of a bar.
             let stop = RefCell::new(stop_when_asked());
             let told = Cell::new(Instant::now());
             let watch = |progress: &Progress| {
@@ -316,7 +316,7 @@ fn plan_text(found: &MeasurementPlan) -> String {
     }
     out += &lines(&t);
     out += "\n";
-    // What the readings will tell.
+    // Expected uncertainty of each parameter.
     let mut t = table(&["parameter", "now", "expected std", "", "unit"]);
     for p in &found.parameters {
         let part = part_of(p.std, p.initial, p.initial);

@@ -269,7 +269,7 @@ fn text(map: &Map) -> String {
         t.add_row(row);
     }
     out += &lines(&t);
-    // Where these two are, and where a workpiece fits best.
+    // Places of these two, and the best place of a workpiece.
     out += &format!("\nbest and worst by {}:\n", quantity_title(&map.by));
     for (name, pose) in [("best", &map.best), ("worst", &map.worst)] {
         let place = pose.place_m.map(|x| format!("{x:.3}")).join(", ");

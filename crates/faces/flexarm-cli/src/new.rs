@@ -199,7 +199,7 @@ fn text(made: &NewRobot) -> String {
         t.add_row(vec![link.name.clone(), format!("{:.0}", 1e3 * link.length), mass, section(link)]);
     }
     out += &lines(&t);
-    // What was assumed, and the files.
+    // Assumptions and files.
     for held in &made.held {
         out += &format!("held     {} at {}: {}\n", held.joint, held.at, held.why);
     }

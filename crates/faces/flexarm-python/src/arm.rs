@@ -203,7 +203,7 @@ impl PyArm {
             close.call0()?;
         }
         let run = run?;
-        // What a user is told: the headline, the files, the caveats.
+        // Messages for the user: headline, files, caveats.
         let (caveats, run) = (run.summary.caveats.clone(), PyRun::new(run));
         caveat::say(py, "ran", (run.headline(),))?;
         if outputs.is_some() {
