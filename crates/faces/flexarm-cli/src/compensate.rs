@@ -7,17 +7,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::{Args, ValueEnum};
+use flexarm::RunOptions;
 use flexarm::compensate::{
     CompensateRequest, Compensation, ErrorFigures, LimitRule, Method, ShaperKind, Shaping, compensate_motion,
 };
-use flexarm::{Motion, RunOptions, Scenario};
 
 use crate::args::{ModellingArgs, RobotArgs, word_of};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::motion::MotionInputArgs;
 use crate::print::file_lines;
-use crate::shipped;
 use crate::shipped::OutputFolder;
 use crate::terminal::{Terminal, answer, to_json, working};
 
@@ -150,12 +149,8 @@ fn shaping(args: &CompensateArgs) -> Result<Option<Shaping>, Failure> {
 
 pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode, Failure> {
     let robot = args.load.load(&args.robot)?;
-    let motion = match (&args.motion, &robot.default_trajectory) {
-        (Some(given), _) => shipped::trajectory(given)?,
-        (None, Some(own)) => own.clone(),
-        (None, None) => return Err(Failure::Usage("the robot has no motion of its own: give one".into())),
-    };
-    let motion = Motion::load_with(&motion, &robot, &args.input.options())?;
+    let scenario = args.input.scenario(&robot, args.motion.as_deref(), args.loads.as_deref())?;
+    // The robot that is commanded, if it differs from the one that is known.
     let plant = match &args.plant {
         Some(given) => {
             let plant = args.load.load(given)?;
@@ -182,10 +177,6 @@ pub(crate) fn run(terminal: &Terminal, args: &CompensateArgs) -> Result<ExitCode
         recording: !args.no_recording,
         overwrite: args.force,
     };
-    let mut scenario = Scenario::new(motion);
-    if let Some(loads) = &args.loads {
-        scenario = scenario.with_loads_file(loads)?;
-    }
     let found = working(terminal, "compensating", || compensate_motion(&robot, scenario, &request))?;
     crate::print::caveats(terminal, &found.caveats);
     answer(terminal, || to_json(&found), || text(&found));
@@ -240,6 +231,7 @@ fn text(found: &Compensation) -> String {
     out += "\n\n";
     out += &shaper_text(found);
     out += &plants_text(found);
+    // Iterations on the model, and what limits cost.
     let peaks: Vec<String> = found.model_peaks_m.iter().map(|peak| format!("{:.4}", 1e3 * peak)).collect();
     out += &format!("\npeak on the model after each iteration (mm): {}\n", peaks.join(", "));
     if found.slowed > 1.0 {

@@ -114,6 +114,7 @@ pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, 
                 output: folder.path(),
                 overwrite: args.force,
             };
+            // Output that is no terminal gets a line every few seconds instead of a bar.
             let stop = RefCell::new(stop_when_asked());
             let told = Cell::new(Instant::now());
             let watch = |progress: &Progress| {
@@ -185,6 +186,7 @@ fn text(found: &Identification) -> String {
     let mut out = format!("{robot}: {readings} readings with {numbers} numbers of {measurements}\n\n");
     out += &parameter_table(found);
     out += &residual_lines(found);
+    // Encoders, mode shapes, parameters that are known only together.
     out.extend(found.encoders.iter().map(encoder_line));
     for shape in &found.shapes {
         out += &format!(
@@ -196,6 +198,7 @@ fn text(found: &Identification) -> String {
     if let Some(more) = found.combinations.len().checked_sub(MAX_COMBINATIONS).filter(|more| *more > 0) {
         out += &format!("only together: {more} more groups (--json and the page list them)\n");
     }
+    // Readings that contradict the others, and what was found beside the parameters.
     for s in &found.suspicious {
         out += &format!(
             "contradicts the others: {}, measured {}, expected {} ({:.1} deviations)\n",
@@ -288,6 +291,7 @@ fn encoder_line(gear: &EncoderFigures) -> String {
 fn plan_text(found: &MeasurementPlan) -> String {
     let mut out =
         format!("{}: {} readings of {} candidate poses\n\n", found.robot, found.poses.len(), found.candidates);
+    // Columns that are the same in all rows are left out.
     let mut header = vec!["pose"];
     header.extend(found.joints.iter().map(String::as_str));
     let levers = found.poses.iter().any(|pose| pose.at != [0.0; 3]);
@@ -312,6 +316,7 @@ fn plan_text(found: &MeasurementPlan) -> String {
     }
     out += &lines(&t);
     out += "\n";
+    // Expected uncertainty of each parameter.
     let mut t = table(&["parameter", "now", "expected std", "", "unit"]);
     for p in &found.parameters {
         let part = part_of(p.std, p.initial, p.initial);

@@ -257,6 +257,7 @@ fn text(map: &Map) -> String {
         None => format!("{}: {} in {:.2} s", map.robot, counted(map.poses, "pose"), map.wall_s),
     };
     out.push('\n');
+    // Each quantity over all poses, and at the best and the worst one.
     let mut t = table(&["", "min", "median", "max", "best", "worst"]);
     for column in map.table.columns.iter().filter(|column| column.quantity) {
         let Some(spread) = map.quantities.get(&column.name) else { continue };
@@ -268,6 +269,7 @@ fn text(map: &Map) -> String {
         t.add_row(row);
     }
     out += &lines(&t);
+    // Places of these two, and the best place of a workpiece.
     out += &format!("\nbest and worst by {}:\n", quantity_title(&map.by));
     for (name, pose) in [("best", &map.best), ("worst", &map.worst)] {
         let place = pose.place_m.map(|x| format!("{x:.3}")).join(", ");

@@ -3,11 +3,12 @@
 //! [`text`] prints peaks against limits in units of the joints (deg or mm, per s). Not here: how
 //! peaks are found (`flexarm::motions`).
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
 use flexarm::motions::{ColumnMap, MotionCurve, MotionOptions, MotionPeak, MotionReport};
+use flexarm::{Motion, Robot, Scenario};
 
 use crate::args::RobotArgs;
 use crate::failure::Failure;
@@ -37,6 +38,25 @@ pub(crate) struct MotionInputArgs {
 impl MotionInputArgs {
     pub(crate) fn options(&self) -> MotionOptions {
         MotionOptions { topic: self.topic.clone(), columns: self.columns.clone() }
+    }
+
+    /// Loads a motion, that of the robot file if none is given, with a file of loads.
+    pub(crate) fn scenario(
+        &self,
+        robot: &Robot,
+        motion: Option<&Path>,
+        loads: Option<&Path>,
+    ) -> Result<Scenario, Failure> {
+        let motion = match (motion, &robot.default_trajectory) {
+            (Some(given), _) => shipped::trajectory(given)?,
+            (None, Some(own)) => own.clone(),
+            (None, None) => return Err(Failure::Usage("the robot has no motion of its own: give one".into())),
+        };
+        let scenario = Scenario::new(Motion::load_with(&motion, robot, &self.options())?);
+        match loads {
+            Some(loads) => Ok(scenario.with_loads_file(loads)?),
+            None => Ok(scenario),
+        }
     }
 }
 
@@ -100,6 +120,7 @@ fn text(report: &MotionReport) -> String {
     out += &peaks(&report.peaks);
     out += "\n";
     out += &curves(&report.curves, &report.peaks);
+    // Limits, notes and files.
     if report.robot.is_some() {
         match report.violations.len() {
             0 => out += "\nall limits are kept\n",
@@ -136,6 +157,7 @@ fn peaks(peaks: &[MotionPeak]) -> String {
         header.push("torque");
     }
     let mut t = table(&header);
+    // Angles in degrees; each peak with the part of its limit that it uses.
     for peak in peaks {
         let (unit, factor) = if peak.unit == "rad" { ("deg", 1f64.to_degrees()) } else { (peak.unit, 1.0) };
         let used = |value: f64, limit: Option<f64>| match limit {

@@ -176,6 +176,7 @@ fn text(made: &NewRobot) -> String {
         made.payload.mass,
         if made.payload.assumed { " (assumed)" } else { "" }
     );
+    // Joints with the drives that were chosen for their torques.
     let mut t = table(&["joint", "torque of weight", "with speeding up", "limit", "reducer, N m/rad", "range"]);
     for joint in &made.joints {
         let drive = made.drives.iter().find(|d| d.joint == joint.name);
@@ -191,12 +192,14 @@ fn text(made: &NewRobot) -> String {
     }
     out += &lines(&t);
     out += "torques in N m with payload; limits in brackets are implausible and not used\n\n";
+    // Links with their sections.
     let mut t = table(&["link", "mm", "kg", "section"]);
     for link in &made.links {
         let mass = link.mass.map_or_else(|| "-".to_owned(), |m| format!("{m:.2}"));
         t.add_row(vec![link.name.clone(), format!("{:.0}", 1e3 * link.length), mass, section(link)]);
     }
     out += &lines(&t);
+    // Assumptions and files.
     for held in &made.held {
         out += &format!("held     {} at {}: {}\n", held.joint, held.at, held.why);
     }

@@ -63,6 +63,7 @@ pub(crate) fn inspection(i: &Inspection) -> String {
     out.extend(i.balancers.iter().map(balancer_line));
     out.extend(i.loops.iter().map(loop_line));
     out.extend(i.flexible_links.iter().map(flexible_lines));
+    // Coupled gears and springs of the base, if there are any.
     if let Some(c) = &i.coupling {
         let rows: Vec<String> = c.matrix.iter().map(|row| format!("{row:?}")).collect();
         out += &format!(

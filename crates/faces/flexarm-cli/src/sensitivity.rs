@@ -5,15 +5,15 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::Args;
+use flexarm::RunOptions;
 use flexarm::sensitivity::{PoseSensitivity, Sensitivity, SensitivityRequest, pose_sensitivity, sensitivity};
-use flexarm::{Motion, RunOptions, Scenario};
 
 use crate::args::{ModellingArgs, RobotArgs};
 use crate::failure::Failure;
 use crate::layout::{lines, table};
 use crate::motion::MotionInputArgs;
 use crate::terminal::{Terminal, answer, to_json, working};
-use crate::{shipped, values};
+use crate::values;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -80,16 +80,7 @@ pub(crate) fn run(terminal: &Terminal, args: &SensitivityArgs) -> Result<ExitCod
         answer(terminal, || to_json(&found), || pose_text(&found));
         return Ok(ExitCode::SUCCESS);
     }
-    let motion = match (&args.motion, &robot.default_trajectory) {
-        (Some(given), _) => shipped::trajectory(given)?,
-        (None, Some(own)) => own.clone(),
-        (None, None) => return Err(Failure::Usage("the robot has no motion of its own: give one".into())),
-    };
-    let motion = Motion::load_with(&motion, &robot, &args.input.options())?;
-    let mut scenario = Scenario::new(motion);
-    if let Some(loads) = &args.loads {
-        scenario = scenario.with_loads_file(loads)?;
-    }
+    let scenario = args.input.scenario(&robot, args.motion.as_deref(), args.loads.as_deref())?;
     let request = SensitivityRequest {
         modelling: args.modelling.modelling(),
         run: RunOptions { step_s: args.step, ignore_limits: args.ignore_limits, ..RunOptions::default() },

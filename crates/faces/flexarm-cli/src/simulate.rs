@@ -26,6 +26,7 @@ pub(crate) fn run(
     if !with_twin && !args.with.is_empty() {
         return Err(Failure::Usage("--with belongs to compare: run has one run only".into()));
     }
+    // Every run is loaded before the first one starts.
     let parts = study::parts(args, line)?;
     let variants = parts.iter().map(|part| {
         variant(part.label.clone(), &part.args, with_twin).map_err(|error| match parts.len() {
@@ -66,6 +67,7 @@ pub(crate) fn run(
 
 /// Returns arm, motion and options of a run.
 fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Failure> {
+    // The robot, with values changed by --set, and its arm.
     let path = shipped::robot(args.robot.as_deref())?;
     let (filed, speed) = if args.set.is_empty() {
         (RobotSource::new(&path, &args.load.options()?).load()?, 1.0)
@@ -79,6 +81,7 @@ fn variant(label: String, args: &RunArgs, with_twin: bool) -> Result<Variant, Fa
     let modelling = args.modelling.modelling();
     let arm = if modelling == Modelling::default() { filed } else { filed.robot().model(&modelling)? };
     let robot = arm.robot();
+    // The motion: given, or that of the robot file; then rounded and slowed down.
     let trajectory = match (&args.trajectory, &robot.default_trajectory) {
         (Some(given), _) => shipped::trajectory(given)?,
         (None, Some(own)) => own.clone(),

@@ -46,6 +46,7 @@ pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part
              with --no-files --json for instance"
         )));
     }
+    // Each --with becomes the command line with its words changed.
     let line = without_with(line);
     let mut varied: Vec<String> = Vec::new();
     let mut others = Vec::new();
@@ -79,6 +80,7 @@ pub(crate) fn parts<'a>(main: &'a RunArgs, line: &[OsString]) -> Result<Vec<Part
         let label = label.unwrap_or_else(|| text.replace(", ", ","));
         others.push(Part { label, args: Cow::Owned(changed(&line, &words).map_err(usage)?) });
     }
+    // If all runs vary one flag, the first run is named by its own value of it.
     let label = match &varied[..] {
         [key] => format!("{key}={}", given(&line, key)),
         _ => "as given".to_owned(),

@@ -37,6 +37,7 @@ fn parse_joint_values(text: &str, joints: &[(&str, bool)], units: &[(&str, f64)]
             Failure::Usage(format!("joint value {s:?} is not a finite number (rad or m, or as in {example})"))
         })
     };
+    // By name: joints that are not named stay at zero. By position: one value for each joint.
     if items.iter().any(|i| i.contains('=')) {
         let mut given = vec![false; joints.len()];
         for item in items {

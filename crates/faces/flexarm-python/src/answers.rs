@@ -57,10 +57,10 @@ impl PyStatics {
         })
     }
 
-    pub(crate) fn of_many(_py: Python<'_>, found: OperatingPoints, m: usize) -> PyResult<Self> {
+    pub(crate) fn of_many(found: OperatingPoints, m: usize) -> Self {
         let elastic = found.frequencies();
         let failures = found.failures.iter().map(|(k, error)| (*k, error.to_string())).collect();
-        Ok(Self {
+        Self {
             rows: Some(m),
             tcp: found.tcp_m,
             deflection: found.deflection_m,
@@ -69,7 +69,7 @@ impl PyStatics {
             elastic,
             failures,
             asked: None,
-        })
+        }
     }
 
     /// Returns a view of numbers with `row` of them at each pose.

@@ -194,6 +194,7 @@ impl PyArm {
             ..options
         };
         let outputs = outputs(output, overwrite, formats, figures)?;
+        // The bar is closed whether the run succeeds or not.
         let bar = progress_function(py, progress)?;
         let run = self.watched(py, &scenario, &options, outputs.as_ref(), observer, bar.clone().map(Bound::unbind));
         if let Some(bar) = bar
@@ -202,6 +203,7 @@ impl PyArm {
             close.call0()?;
         }
         let run = run?;
+        // Messages for the user: headline, files, caveats.
         let (caveats, run) = (run.summary.caveats.clone(), PyRun::new(run));
         caveat::say(py, "ran", (run.headline(),))?;
         if outputs.is_some() {
@@ -250,6 +252,7 @@ impl PyArm {
             settling_band_m: settling_band,
             ..options
         };
+        // All cores without the GIL; then a failed run is raised or stands in the list.
         let arm = self.arm.clone();
         let found = stoppable(py, move |stop| arm.simulate_batch(&scenarios, &options, stop))?;
         let list = PyList::empty(py);
@@ -368,7 +371,7 @@ impl PyArm {
         if let Some(m) = given.as_ref().and_then(|given| given.rows) {
             let (poses, arm) = (poses.to_vec(), own.arm.clone());
             let found = stoppable(py, move |stop| arm.operating_points_until(&poses, &as_wrench(F), stop))?;
-            return PyStatics::of_many(py, found.or_raise()?, m);
+            return Ok(PyStatics::of_many(found.or_raise()?, m));
         }
         let mut at = own.point()?.lock().unwrap_or_else(PoisonError::into_inner);
         let failed = |error| Error::Step { source: error, partial: false };
@@ -552,6 +555,7 @@ impl PyArm {
         observer: Option<Py<PyAny>>,
         progress: Option<Py<PyAny>>,
     ) -> PyResult<flexarm::Run> {
+        // Progress and observer call Python from the run; what they raise is kept and stops it.
         let watch = Mutex::new(Watch::new(progress));
         let locked = || watch.lock().unwrap_or_else(PoisonError::into_inner);
         let mut report = |done: f64, total: f64| locked().poll(done, total);
@@ -575,6 +579,7 @@ impl PyArm {
             self.arm.simulate_with(scenario, options, request)
         });
         drop(show);
+        // An exception of a callback comes before the error of the run that it stopped.
         let mut watch = watch.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(raised) = watch.raised.take() {
             return Err(raised);

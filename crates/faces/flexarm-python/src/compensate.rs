@@ -188,6 +188,7 @@ pub(crate) fn compensate<'py>(
     let accelerations = accelerations.map(|a| numbers("accelerations", a, &[(n, "joints")], false)).transpose()?;
     let optimal = Shaping::Optimal { delay_s: delay, band };
     let shapers = [("zv", ShaperKind::Zv.into()), ("zvd", ShaperKind::Zvd.into()), ("optimal", optimal)];
+    // Words, arrays and other robots become a request; None is the library's default.
     let request = CompensateRequest {
         modelling: modelling(links, drives, None, None)?,
         run: RunOptions { step_s: step, ..RunOptions::default() },
@@ -210,6 +211,7 @@ pub(crate) fn compensate<'py>(
     let name = format!("{}_compensated", scenario.motion.name);
     let found = stoppable(py, move |stop| compensate_motion_until(&of, scenario, &request, stop))?.or_raise()?;
     caveat::answer(py, &found, &found.caveats)?;
+    // The commands as a motion that other calls take.
     let motion = Motion::along((*found.trajectory).clone(), &name, &robot.get().robot).or_raise()?;
     Ok(PyCompensated::new(Py::new(py, PyMotion::made(motion, robot))?, found))
 }

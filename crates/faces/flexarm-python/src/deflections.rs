@@ -75,11 +75,13 @@ pub(crate) fn variations(
     let mass = plain("payload_mass", given.mass)?;
     let com = Parameter::new("payload_com", given.com, &[(3, "numbers (m)")])?;
     let inertia = Parameter::new("payload_inertia", given.inertia, &[(3, "rows"), (3, "columns (kg m²)")])?;
+    // A payload is given as a whole; an inertia may be left out.
     if mass.values.is_some() != com.values.is_some() || (inertia.values.is_some() && mass.values.is_none()) {
         return Err(PyValueError::new_err(
             "a payload needs payload_mass (kg) and payload_com (m, axes of the link that carries it)",
         ));
     }
+    // All that have a value for each run have equally many.
     let all = [&stiffness, &damping, &time_scale, &mass, &com, &inertia];
     let mut counts: Vec<(&str, usize)> = all.iter().filter_map(|parameter| parameter.rows()).collect();
     if let Scenarios::Each(each) = &scenarios {
@@ -92,6 +94,7 @@ pub(crate) fn variations(
             "{name} has {found} values, {first} has {m}: expected one, or one for each run"
         )));
     }
+    // One scenario for each run: slowed down, with its payload.
     let own = &robot.get().robot;
     let model = own.rigid_model().or_raise()?;
     let mut runs = Vec::with_capacity(m);

@@ -113,6 +113,7 @@ pub(crate) fn plan_measurements<'py>(
         let rows = table(name, rows, 3, what)?;
         Ok(Some(rows.values().chunks_exact(3).map(|row| [row[0], row[1], row[2]]).collect()))
     };
+    // Forces, levers, watched points and gauge directions: rows of three numbers.
     let forces = threes("forces", forces, "numbers (N)")?.unwrap_or_else(|| usual.forces.clone());
     let request = PlanRequest {
         modelling: modelling(links, drives, None, None)?,

@@ -76,6 +76,7 @@ pub(crate) fn lobes<'py>(
     let modelling = modelling(links, drives, None, None)?;
     let request = LobesRequest { modelling, deepest_m: deepest, ranges, output, overwrite };
     let robot = robot.get().robot.clone();
+    // Ctrl-C ends the computation between two limits.
     let found = stoppable(py, move |stop| {
         let place = match &motion {
             Some(motion) => CuttingPlace::Along(motion, places),

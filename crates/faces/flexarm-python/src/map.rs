@@ -256,6 +256,7 @@ pub(crate) fn map<'py>(
 ) -> PyResult<PyMap> {
     let n = robot.get().robot.rigid_model().or_raise()?.n_actuated();
     let grid = GridArguments { bounds, spacing, keep_out, tool_axis, roll, cone, tilts, rolls };
+    // Places: joint values, poses, instants of a motion, or a grid in space.
     let region = region(robot, n, Places { joints, poses, along, points }, &grid)?;
     let at = at.map(|at| numbers("at", at, &[(n, "joints")], false)).transpose()?;
     let request = MapRequest {

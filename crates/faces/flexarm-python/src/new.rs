@@ -6,13 +6,12 @@ use flexarm::new::Reducer;
 use flexarm::robots::{NewOptions, ReadOptions, new_robot as make};
 use flexarm::settings::written::message;
 use flexarm::{Finding, Severity};
-use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use crate::caveat;
 use crate::failure::OrRaise;
 use crate::robot::estimate;
-use crate::values::{plain, texts};
+use crate::values::{plain, texts, word};
 
 /// Creates a robot file with initial guesses, and a sample motion, from a URDF or xacro file.
 ///
@@ -62,17 +61,11 @@ pub(crate) fn new_robot<'py>(
         inertia_from_mesh: estimate(inertia_from_density, inertia_from_total_mass)?,
         ..ReadOptions::default()
     };
-    let reducers = match reducers {
-        None => None,
-        Some("cycloidal") => Some(Reducer::Cycloidal),
-        Some("strain-wave") => Some(Reducer::StrainWave),
-        Some(other) => {
-            let what = format!("reducers is {other:?}; give \"cycloidal\" or \"strain-wave\"");
-            return Err(PyValueError::new_err(what));
-        }
-    };
+    let words = [("cycloidal", Reducer::Cycloidal), ("strain-wave", Reducer::StrainWave)];
+    let reducers = reducers.map(|found| word("reducers", found, &words)).transpose()?;
     let options = NewOptions { base, tool, joints, payload_kg: payload, reducers, urdf: read };
     let made = py.detach(|| make(&urdf, &folder, overwrite, &options)).or_raise()?;
+    // Doubtful values of the description are warnings; their places and sentences are written for Python.
     let shown = |finding: &Finding| {
         let [location, message] = [&finding.location, &finding.message].map(|text| message(text));
         Finding { location, message, ..finding.clone() }

@@ -104,6 +104,7 @@ pub(crate) fn load(
     for (name, value) in arguments.iter().flat_map(|arguments| arguments.iter()) {
         urdf.arguments.push((name.extract()?, value.str()?.extract()?));
     }
+    // A pickle of the robot loads it again with the same arguments.
     choices.set_item("tcp", &tcp)?;
     choices.set_item("packages", packages)?;
     choices.set_item("arguments", arguments)?;

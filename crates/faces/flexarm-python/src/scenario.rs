@@ -257,6 +257,7 @@ pub(crate) fn scenario(
     start_word: Option<&str>,
 ) -> PyResult<Scenario> {
     let py = robot.py();
+    // A Scenario has all parts: its own are used.
     if let Some(whole) = given.and_then(|given| given.cast::<PyScenario>().ok()) {
         if loads.is_some() || payloads.is_some() || start_word.is_some() {
             return Err(PyValueError::new_err("loads, payloads and start are parts of the Scenario: give them there"));
@@ -266,6 +267,7 @@ pub(crate) fn scenario(
         let (motion, loads, payloads) = (bound(&whole.motion), bound(&whole.loads), bound(&whole.payloads));
         return scenario(robot, motion.as_ref(), loads.as_ref(), payloads.as_ref(), whole.start.as_deref());
     }
+    // Parts given one by one: motion and start, then loads, then payloads.
     let mut made = Scenario::new(motion_of(robot, given)?).with_start(start(start_word)?);
     if let Some(loads) = loads.filter(|loads| !loads.is_none()) {
         if let Ok(file) = path("loads", loads) {

@@ -32,6 +32,7 @@ impl Curves {
         let (error, mut tracks) = if header.has_rigid { error_curves(root) } else { Default::default() };
         let joints = &header.joints;
         let of_joint = |k: usize| series(header.color_number(&joints[k]));
+        // Joints of both arms, then elements, then what they contribute to the error.
         tracks.push(group(at(&["joints", "position"]), joints.clone(), &of_joint));
         tracks.push(group(at(&["joints", "velocity"]), joints.clone(), &of_joint));
         tracks.push(group(at(&["joints", "effort", "flexible"]), joints.clone(), &of_joint));
@@ -45,6 +46,7 @@ impl Curves {
             let names = header.contributors.iter().map(|name| format!("{name} [mm]")).collect();
             tracks.push(group(at(&["contributions"]), names, &series));
         }
+        // Gauges by quantity, with the unit in which each is shown.
         let mut gauges = Vec::new();
         for quantity in GaugeQuantity::ALL {
             let (name_of_plot, unit, factor) = quantity.shown();

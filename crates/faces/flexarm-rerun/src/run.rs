@@ -193,6 +193,7 @@ impl RunTracks {
         let root = role.root(header);
         let scale = ColorScale { full_m: header.color_scale_m };
         let DrawnRobots { flexible, rigid, magnified } = DrawnRobots::new(header, role, scale, stream)?;
+        // The arrow of the error, and the curves: all for the first run, the error for others.
         let arrow = has_magnified(header).then(|| ArrowTrack::new(root.join(&path(["magnified", "error"]))));
         if let Some(arrow) = &arrow {
             arrow.style(stream, role.color().unwrap_or_else(colors::total))?;

@@ -105,6 +105,7 @@ fn pieces(line: &str) -> Vec<Piece> {
     let (mut pieces, mut words, mut k) = (Vec::new(), String::new(), 0);
     while k < bytes.len() {
         let at_word = k > 0 && (bytes[k - 1].is_ascii_alphanumeric() || bytes[k - 1] == b'_');
+        // A digit within a word (x2y) is a part of the word.
         match number(&bytes[k..]).filter(|_| !at_word) {
             Some(length) => {
                 pieces.push(Piece::Words(std::mem::take(&mut words)));

@@ -79,6 +79,7 @@ fn run(args: &Args) -> Result<ExitCode, Error> {
         let what = "the stored page cannot be read: there is no such file".to_owned();
         return Err(flexarm::Error::File { path: path.clone(), what }.into());
     }
+    // Whether files can be written is known before a minute of computing.
     let wanted = !args.no_files && args.check.is_none();
     let files = wanted.then(|| VerificationFiles::new(&args.output, args.force)).transpose()?;
     let root = args.data.clone().unwrap_or_else(checkout);
@@ -93,6 +94,7 @@ fn run(args: &Args) -> Result<ExitCode, Error> {
         }
     })?;
     let wall_s = started.elapsed().as_secs_f64();
+    // Results: files, or differences from stored ones; then numbers for programs or for people.
     if let Some(files) = &files {
         files.write(&verification)?;
     }

@@ -86,6 +86,7 @@ pub(crate) fn run(terminal: &Terminal, args: &PlanArgs) -> Result<ExitCode, Fail
     }
     let name = clean(sweep.name());
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{name}_plan")));
+    // An engine may start shards in any folder: all paths are absolute.
     let whole =
         |path: &Path| quoted(&std::path::absolute(path).unwrap_or_else(|_| path.to_owned()).display().to_string());
     let program = args.program.clone().or_else(|| std::env::current_exe().ok());

@@ -65,12 +65,14 @@ impl SliderCrank {
         let (slider_truth, truth_m) = ([column(1), column(3)], [column(2), column(4)]);
         let peak_m = [0, 1].map(|k| truth_m[k].iter().copied().worst());
         let crank: Vec<Vector2<f64>> = truth.iter().map(|row| crank_pin(&motion.trajectory, row[0])).collect();
+        // Chains, modal rods without and with stiffness by load, compliant constraints.
         let mut methods: Vec<Method> = PARTS.iter().map(|n| Method::new(in_parts(*n))).collect();
         methods.extend([Method::new(in_modes(MODES)), Method::stiffening(in_modes(MODES))]);
         methods.push(Method::spook(in_parts(PARTS[1])));
         let (mut runs, count) = (Vec::new(), methods.len());
         for (k, method) in methods.into_iter().enumerate() {
             progress(k as f64 / count as f64);
+            // The middle of the rod and the slider are two frames: a run for each.
             let middle = method.run(&robot, &motion, STEP_S, RATE_HZ)?;
             let slider = method.run(&slider_robot, &motion, STEP_S, RATE_HZ)?;
             let comparable = same_times(middle.rows.iter().map(|row| row.time_s), truth.iter().map(|row| row[0]));

@@ -128,6 +128,7 @@ fn blade(folder: &Path, sweep: f64) -> Result<Robot, Error> {
         let path = folder.join(name);
         std::fs::write(&path, text).map(|()| path.clone()).map_err(|e| fault(&path, &e))
     };
+    // The mesh, reduced between root and tip with geometric stiffness.
     write("blade.inp", &mesh(sweep))?;
     let job = format!(
         r#"mesh = "blade.inp"
@@ -146,6 +147,7 @@ interface = [
     let job = ReduceJob::parse(&job, &folder.join("blade.reduce.toml")).map_err(flexarm::Error::from)?;
     let outputs = ReduceOutputs { folder: None, flex: Some(folder.join("blade.flex")), overwrite: true };
     reduce(&job, &ReduceOptions::default(), Some(&outputs), &mut |_| {})?;
+    // A robot that turns it about the axis, without gravity.
     let urdf = format!(
         r#"<robot name="rotor">
   <link name="base"/>

@@ -1,8 +1,8 @@
 //! A cast lower arm: from a tetrahedral mesh to a link, each step compared with the mesh and with
 //! two other programs.
 //!
-//! `truth` holds the results of the mesh and of the other programs, `study` and `parts` compute
-//! findings, `page` and `parts_page` write them up.
+//! `truth` has the results of the mesh and of the other programs, `study` computes findings, `page`
+//! writes them up.
 
 mod page;
 mod study;

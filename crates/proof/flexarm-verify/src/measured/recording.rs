@@ -61,6 +61,7 @@ impl Recording {
         let all = |name: fn(usize) -> String, count: usize| -> Result<Vec<Vec<f64>>, Error> {
             (1..=count).map(|axis| column(&name(axis))).collect()
         };
+        // Torques on the joint side; positions and torques smoothed alike, then differentiated.
         let motor = all(|k| format!("q_motor_{k}_rad"), AXES)?;
         let low = LowPass::new(SMOOTH_HZ, 1.0 / STEP_S);
         let ratio = |axis: usize| robot.drives.get(axis).map_or(f64::NAN, |drive| drive.ratio);

@@ -85,6 +85,7 @@ impl BarMesh {
             fe.interface("B", Vector3::new(LENGTH_M, 0.0, 0.0), Tie::Rigid)?,
         ];
         interfaces.extend(STATIONS_M.map(|x| fe.section(x)));
+        // Compliance of all interfaces but A, which is held.
         let condensation = fe.condense(&interfaces)?;
         let (K, held) = (condensation.stiffness(), 6 * (interfaces.len() - 1));
         let C = K
