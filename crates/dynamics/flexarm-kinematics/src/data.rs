@@ -163,7 +163,6 @@ impl<T: Real> Data<T> {
 
     /// Returns `X_WF`, the pose of a frame in the world, from the last
     /// [`crate::forward_kinematics`].
-    #[inline(always)]
     pub fn X_WF(&self, frame: &Frame) -> Pose<T> {
         let (X_WB, X_BF) = (&self.X_WB[frame.body], &frame.X_BF);
         let R_WB = X_WB.rotation.matrix();
@@ -269,7 +268,6 @@ fn place_axis<T: Real>(body: &Body, motion: AxisMotion, data: &mut Data<T>, i: u
 }
 
 /// Kinetic energy of the rotors, `Σ ½ a q̇² + Σ a_12 q̇_1 q̇_2`.
-#[inline(always)]
 pub(crate) fn rotor_energy<T: Real>(model: &Model, qdot: &[T]) -> T {
     let mut energy = T::zero();
     for &(k, a) in &model.rotors {

@@ -31,7 +31,6 @@ pub fn forward_kinematics(model: &Model, data: &mut Data, q: &DVector<f64>) {
 }
 
 /// [`forward_kinematics`] of the tree, with balancer lengths.
-#[inline(always)]
 pub(crate) fn place_and_measure(model: &Model, data: &mut Data, q: &[f64]) {
     place_bodies(model, data, q);
     measure(model, data, q);
@@ -62,7 +61,6 @@ pub fn forward_kinematics_velocity(model: &Model, data: &mut Data, state: &State
 }
 
 /// [`forward_kinematics_velocity`] of the tree, with balancer lengths.
-#[inline(always)]
 pub(crate) fn move_bodies(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64]) {
     data.V[0] = Twist::zeros();
     data.rotor_energy = rotor_energy(model, qdot);
@@ -258,7 +256,6 @@ pub fn frame_jacobian_derivative(model: &Model, data: &Data, state: &State, fram
 
 /// As [`joint_columns`], with the rates of the columns: `[l, a, l', a']`. `w_B` is the angular
 /// velocity of the body in the axes of the columns; `q` and `qdot` are those of the tree.
-#[inline(always)]
 #[allow(clippy::too_many_arguments, reason = "of two callers, each with other axes")]
 pub(crate) fn joint_column_rates(
     model: &Model,

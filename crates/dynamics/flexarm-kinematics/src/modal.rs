@@ -178,13 +178,11 @@ impl Integrals {
 }
 
 /// `∫ r × φ` from `Q = ∫ φ rᵀ`.
-#[inline(always)]
 fn axial(Q: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(Q[(2, 1)] - Q[(1, 2)], Q[(0, 2)] - Q[(2, 0)], Q[(1, 0)] - Q[(0, 1)])
 }
 
 /// Symmetric part with doubled off-diagonal entries: xx, yy, zz, xy + yx, xz + zx, yz + zy.
-#[inline(always)]
 fn symmetric(Q: &Matrix3<f64>) -> [f64; 6] {
     let off = |a: usize, b: usize| Q[(a, b)] + Q[(b, a)];
     [Q[(0, 0)], Q[(1, 1)], Q[(2, 2)], off(0, 1), off(0, 2), off(1, 2)]

@@ -134,7 +134,6 @@ pub(crate) fn at_rest<T: Real>(model: &Model, data: &mut Data<T>) {
 
 /// [`newton_euler`] with the balancers of the model, for the tree; closed loops are handled in
 /// `closure`.
-#[inline(always)]
 pub(crate) fn balanced(model: &Model, data: &mut Data, q: &[f64], qdot: &[f64], qddot: Option<&[f64]>) {
     match model.balancers.is_empty() {
         true => newton_euler(model, data, q, qdot, qddot),

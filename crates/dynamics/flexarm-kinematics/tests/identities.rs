@@ -627,18 +627,21 @@ fn a_joint_axis_and_its_column_describe_one_motion() {
         AxisMotion::Helical { axis, pitch: -4.0 },
     ];
     let F = Wrench::new(Vector3::new(3.0, -5.0, 7.0), Vector3::new(-2.0, 11.0, 4.0));
+    let mut worst = [0.0_f64; 4];
     for motion in motions {
         let S = motion.column();
         for q in [-1.3, 0.0, 2.7] {
-            assert!((motion.coordinate_of(&(S * q)) - q).abs() < 1e-14, "{motion:?}"); // measured 4.4e-16
-            assert!((motion.twist(q).to_vector() - S * q).amax() < 1e-14, "{motion:?}"); // measured 0
+            worst[0] = worst[0].max((motion.coordinate_of(&(S * q)) - q).abs());
+            worst[1] = worst[1].max((motion.twist(q).to_vector() - S * q).amax());
         }
-        assert!((motion.project(&F) - S.dot(&F.to_vector())).abs() < 1e-13, "{motion:?}"); // measured 3.6e-15
+        worst[2] = worst[2].max((motion.project(&F) - S.dot(&F.to_vector())).abs());
         // A small motion along the pose is the column, to second order.
         let (h, X) = (1e-5, motion.pose(1e-5));
-        let d = X.translation.vector;
-        let r = rotation_vector(X.rotation.matrix());
-        let moved = nalgebra::Vector6::new(d.x, d.y, d.z, r.x, r.y, r.z) / h;
-        assert!((moved - S).amax() < 1e-9, "{motion:?}"); // measured 6e-12
+        let (d, r) = (X.translation.vector, rotation_vector(X.rotation.matrix()));
+        worst[3] = worst[3].max((nalgebra::Vector6::new(d.x, d.y, d.z, r.x, r.y, r.z) / h - S).amax());
+    }
+    eprintln!("{worst:?}");
+    for (found, bound) in worst.into_iter().zip([1e-14, 1e-14, 1e-13, 1e-9]) {
+        assert!(found < bound, "{found:e} {bound:e}");
     }
 }

@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, ElasticGroup, Model, State, Wrench, mass_matrix};
-use nalgebra::{DMatrix, DVector};
+use flexarm_kinematics::{Data, ElasticGroup, Model, Wrench, mass_matrix};
+use nalgebra::DMatrix;
 
 use crate::error::StepError;
 use crate::events::SAME_TIME;
@@ -226,11 +226,8 @@ impl Plant {
     /// computed.
     fn mass_at_start(&self) -> DMatrix<f64> {
         let (model, n) = (&self.model, self.model.n_elastic());
-        let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-        self.prescribed_state(0.0, &mut state, &mut qddot);
-        state.q.rows_mut(model.n_actuated(), n).copy_from(&self.modes.equilibrium);
-        let mut data = Data::new(&self.model);
-        let M = mass_matrix(model, &mut data, &state.q);
+        let mut data = Data::new(model);
+        let M = mass_matrix(model, &mut data, &self.coordinates_at(0.0, &self.modes.equilibrium));
         M.view((model.n_actuated(), model.n_actuated()), (n, n)).clone_owned()
     }
 

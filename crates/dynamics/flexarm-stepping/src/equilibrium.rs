@@ -38,6 +38,12 @@ pub(crate) struct Equilibrium {
     pub(crate) iterations: usize,
 }
 
+/// Returns whether an iteration has converged, or is limited by round-off: the residual is small and no
+/// longer falls.
+pub(crate) fn settled(iteration: usize, residual: f64, previous: f64) -> bool {
+    residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous)
+}
+
 /// Finds the equilibrium from near coordinates.
 ///
 /// # Errors
@@ -50,8 +56,7 @@ pub(crate) fn equilibrium(forces: &mut impl Forces, mut e: DVector<f64>) -> Resu
         let (r, scale) = forces.unbalanced(&e)?;
         let previous = residual;
         residual = if e.is_empty() { 0.0 } else { r.amax() / scale.max(f64::MIN_POSITIVE) };
-        // Converged, or limited by round-off.
-        if residual <= TOLERANCE || (iterations > 2 && residual < 1e-9 && residual >= 0.5 * previous) {
+        if settled(iterations, residual, previous) {
             return Ok(Equilibrium { e, residual, iterations });
         }
         if !residual.is_finite() || iterations == most {

@@ -10,15 +10,13 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, rotation_vector};
-use nalgebra::DVector;
 
 use crate::error::StepError;
 use crate::observation::Observation;
 use crate::plant::Plant;
 use crate::servo::TorqueLimited;
-use crate::statics::static_equilibrium;
 use crate::stepper::{Start, Stepper};
-use crate::steppers::AlphaSettings;
+use crate::steppers::{AlphaSettings, at_start};
 use crate::tool_run::{ToolPoses, steps};
 
 /// Settings of a run with fully converged iterations.
@@ -54,16 +52,7 @@ impl ExactRun {
     /// As [`new_stepper`](crate::new_stepper) and [`Stepper::step`].
     pub fn errors(&self, plant: &Plant) -> Result<ToolErrors, StepError> {
         let Self { settings, step_s, .. } = *self;
-        if !(step_s.is_finite() && step_s > 0.0) {
-            return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {step_s}")));
-        }
-        let mut plant = plant.clone();
-        plant.carry_from_start()?;
-        let e = match self.start {
-            Start::Equilibrium => static_equilibrium(&plant, 0.0)?,
-            Start::Undeformed => DVector::zeros(plant.model.n_elastic()),
-        };
-        let plant = Arc::new(plant);
+        let (plant, e) = at_start(Arc::new(plant.clone()), step_s, self.start)?;
         let mut stepper = settings.stepper(plant.clone(), step_s, &e)?;
         stepper.integrator = stepper.integrator.exactly();
         let (mut observed, mut poses) = (Observation::new(&plant), ToolPoses::new(&plant, &self.tool));

@@ -14,9 +14,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use flexarm_kinematics::{
-    Data, Frame, Pose, State, StaticTangent, Wrench, forward_kinematics, frame_jacobian, mass_matrix,
-};
+use flexarm_kinematics::{Data, Frame, Pose, StaticTangent, Wrench, forward_kinematics, frame_jacobian, mass_matrix};
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::drive::{Friction, ServoAxis};
@@ -92,9 +90,7 @@ impl Linear {
         let C = J * yielding;
         Ok(Matrix6::from_fn(|i, j| C[(i, j)]))
     }
-}
 
-impl Linear {
     /// Returns the static twist of the tool per change of the commands, `J_a - J K^-1 K_a`, 6×m:
     /// rigid motion plus the change of the deflection. `None` if a direction has no stiffness.
     pub fn command_slopes(&self) -> Option<Matrix6xX<f64>> {
@@ -138,7 +134,7 @@ pub fn linearise(plant: &Plant, tool: &Frame, F_T_W: &Wrench, t: f64) -> Result<
     let mut data = Data::new(model);
     let statics = Statics { plant, tool, F_T_W: *F_T_W, t };
     let Equilibrium { e, residual, iterations } = statics.equilibrium(&mut data)?;
-    let q = all_coordinates(plant, t, &e);
+    let q = plant.coordinates_at(t, &e);
     let p = statics.forces(&mut data, &q);
 
     // Free coordinates: K = springs + ∂p/∂q, D, M, and the Jacobian of the tool.
@@ -321,15 +317,6 @@ impl Tangents {
     }
 }
 
-/// Returns all coordinates: joints on their reference at `t`, and elastic coordinates `e`.
-fn all_coordinates(plant: &Plant, t: f64, e: &DVector<f64>) -> DVector<f64> {
-    let model = &plant.model;
-    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    plant.prescribed_state(t, &mut state, &mut qddot);
-    state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
-    state.q
-}
-
 /// Returns the elastic coordinates in equilibrium under weight, the loads at `t` and a wrench at the
 /// tool's origin (world axes).
 ///
@@ -449,7 +436,7 @@ struct UnderLoad<'a> {
 impl Forces for UnderLoad<'_> {
     fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError> {
         let plant = self.statics.plant;
-        let q = all_coordinates(plant, self.statics.t, e);
+        let q = plant.coordinates_at(self.statics.t, e);
         let p = self.statics.forces(self.data, &q);
         let spring = spring_forces(plant, q.as_slice(), e);
         let elastic_p = p.rows(plant.model.n_actuated(), e.len());
@@ -459,7 +446,7 @@ impl Forces for UnderLoad<'_> {
 
     fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, scale: f64) -> Result<DVector<f64>, StepError> {
         let (plant, m, n) = (self.statics.plant, self.statics.plant.model.n_actuated(), e.len());
-        let q = all_coordinates(plant, self.statics.t, e);
+        let q = plant.coordinates_at(self.statics.t, e);
         let springs = with_curves(plant, &self.at_rest, q.as_slice(), e);
         let slopes = self.statics.slopes(self.data, &q).view((m, m), (n, n)).into_owned();
         let is_stable = |K: &DMatrix<f64>| ((K + K.transpose()) * 0.5).cholesky().is_some();

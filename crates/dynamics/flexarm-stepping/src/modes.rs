@@ -3,8 +3,8 @@
 //! `K_t φ = ω² M φ` over the elastic coordinates; K_t is the stiffness of the springs plus that of
 //! weight and loads. Not here: damped modes and frequency response (`flexarm-analysis`).
 
-use flexarm_kinematics::{Data, State, mass_matrix};
-use nalgebra::{Cholesky, DMatrix, DVector, SymmetricEigen};
+use flexarm_kinematics::{Data, mass_matrix};
+use nalgebra::{Cholesky, DMatrix, SymmetricEigen};
 
 use crate::error::StepError;
 use crate::plant::{Modes, Plant};
@@ -23,14 +23,12 @@ pub(crate) fn modes_at(plant: &Plant, t: f64) -> Result<Modes, StepError> {
     let model = &plant.model;
     let equilibrium = static_equilibrium(plant, t)?;
     let mut data = Data::new(&plant.model);
-    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    plant.prescribed_state(t, &mut state, &mut qddot);
     // K_t = K + ∂g/∂e and M at the equilibrium.
-    let K = for_vibration(plant, &plant.stiffness(), state.q.as_slice(), &equilibrium);
+    let q = plant.coordinates_at(t, &equilibrium);
+    let K = for_vibration(plant, &plant.stiffness(), q.as_slice(), &equilibrium);
     let Kt = tangent_stiffness(plant, &mut data, t, &equilibrium, &K);
     let na = model.n_actuated();
-    state.q.rows_mut(na, n).copy_from(&equilibrium);
-    let M = mass_matrix(model, &mut data, &state.q).view((na, na), (n, n)).clone_owned();
+    let M = mass_matrix(model, &mut data, &q).view((na, na), (n, n)).clone_owned();
     modes_of(&Kt, &M, t).map(|modes| Modes { equilibrium, ..modes })
 }
 

@@ -301,6 +301,14 @@ impl Plant {
         self.motion.sample(t, &mut q[..n], &mut qdot[..n], &mut qddot.as_mut_slice()[..n]);
     }
 
+    /// Returns all coordinates, nv: joints on the motion at time `t` (s), and elastic coordinates `e`.
+    pub(crate) fn coordinates_at(&self, t: f64, e: &DVector<f64>) -> DVector<f64> {
+        let (mut state, mut qddot) = (State::zeros(&self.model), DVector::zeros(self.model.nv()));
+        self.prescribed_state(t, &mut state, &mut qddot);
+        state.q.rows_mut(self.model.n_actuated(), e.len()).copy_from(e);
+        state.q
+    }
+
     /// Writes the external loads at time `t` into `data.F_ext`, for the poses in `data.X_WB`.
     pub(crate) fn apply_loads(&self, data: &mut Data, t: f64) {
         for load in &self.loads {

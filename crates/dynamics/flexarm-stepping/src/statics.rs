@@ -7,7 +7,7 @@
 
 use flexarm_kinematics::products::{add, cross, lift, tr_mul};
 use flexarm_kinematics::{
-    Data, Frame, PointLoad, Real, State, StaticTangent, Twist, Wrench, forward_kinematics, gravity_forces,
+    Data, Frame, PointLoad, Real, StaticTangent, Twist, Wrench, forward_kinematics, gravity_forces,
     gravity_forces_at_poses,
 };
 use nalgebra::{DMatrix, DVector};
@@ -50,8 +50,11 @@ struct UnderWeight<'a> {
 
 impl Forces for UnderWeight<'_> {
     fn unbalanced(&mut self, e: &DVector<f64>) -> Result<(DVector<f64>, f64), StepError> {
-        let found = unbalanced(self.plant, &mut self.data, self.t, e);
-        StepError::open_loop(&self.plant.model, &self.data, self.t).map_or(Ok(found), Err)
+        let Self { plant, data, t, .. } = self;
+        let g = gravity_part(plant, data, *t, e);
+        let spring = spring_forces(plant, &joints_at(plant, *t), e);
+        let scale = g.amax().max(spring.amax()).max(plant.friction_of_gears());
+        StepError::open_loop(&plant.model, data, *t).map_or(Ok((spring + g, scale)), Err)
     }
 
     fn step(&mut self, e: &DVector<f64>, r: &DVector<f64>, scale: f64) -> Result<DVector<f64>, StepError> {
@@ -73,14 +76,7 @@ impl Forces for UnderWeight<'_> {
     }
 }
 
-/// Returns the unbalanced generalised forces, and the scale of the balancing forces.
-fn unbalanced(plant: &Plant, data: &mut Data, t: f64, e: &DVector<f64>) -> (DVector<f64>, f64) {
-    let g = gravity_part(plant, data, t, e);
-    let spring = spring_forces(plant, &joints_at(plant, t), e);
-    let scale = g.amax().max(spring.amax()).max(plant.friction_of_gears());
-    (spring + g, scale)
-}
-
+/// Returns the spring forces over the elastic coordinates, with the joints at `q`.
 pub(crate) fn spring_forces(plant: &Plant, q: &[f64], e: &DVector<f64>) -> DVector<f64> {
     let mut f = DVector::zeros(e.len());
     add_spring_forces(plant, q, e.as_slice(), f.as_mut_slice());
@@ -92,9 +88,7 @@ fn joints_at(plant: &Plant, t: f64) -> Vec<f64> {
     if plant.transmission.is_empty() && !plant.has_guides() {
         return Vec::new();
     }
-    let (mut state, mut qddot) = (State::zeros(&plant.model), DVector::zeros(plant.model.nv()));
-    plant.prescribed_state(t, &mut state, &mut qddot);
-    state.q.as_slice().to_vec()
+    plant.coordinates_at(t, &DVector::zeros(plant.model.n_elastic())).as_slice().to_vec()
 }
 
 /// Adds the spring forces, `f += K e` or the curves, over the elastic coordinates, with the joints
@@ -142,16 +136,14 @@ pub(crate) fn add_wrench<T: Real>(data: &mut Data<T>, at: &Frame, F_W: &Wrench) 
     data.F_ext[at.body] += Wrench::new(force, add(&moment, &cross(&p_B, &force)));
 }
 
+/// Returns weight, loads and load-dependent stiffness over the elastic coordinates.
 fn gravity_part(plant: &Plant, data: &mut Data, t: f64, e: &DVector<f64>) -> DVector<f64> {
-    let model = &plant.model;
-    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    plant.prescribed_state(t, &mut state, &mut qddot);
-    state.q.rows_mut(model.n_actuated(), e.len()).copy_from(e);
+    let (model, q) = (&plant.model, plant.coordinates_at(t, e));
     if !plant.loads.is_empty() {
-        forward_kinematics(model, data, &state.q);
+        forward_kinematics(model, data, &q);
         plant.apply_loads(data, t);
     }
-    let mut g = gravity_forces(model, data, &state.q).rows(model.n_actuated(), e.len()).clone_owned();
+    let mut g = gravity_forces(model, data, &q).rows(model.n_actuated(), e.len()).clone_owned();
     add_geometric_forces(plant, data, e.as_slice(), g.as_mut_slice());
     g
 }
@@ -233,11 +225,8 @@ pub(crate) fn tangent_stiffness(
     K: &DMatrix<f64>,
 ) -> DMatrix<f64> {
     let (m, n) = (plant.model.n_actuated(), e.len());
-    let (mut state, mut qddot) = (State::zeros(&plant.model), DVector::zeros(plant.model.nv()));
-    plant.prescribed_state(t, &mut state, &mut qddot);
-    state.q.rows_mut(m, n).copy_from(e);
     let mut G = DMatrix::zeros(n, n);
-    StaticSlopes::new(plant, m).compute(plant, None, t, data, &state.q, &mut G);
+    StaticSlopes::new(plant, m).compute(plant, None, t, data, &plant.coordinates_at(t, e), &mut G);
     K + (&G + G.transpose()) * 0.5
 }
 

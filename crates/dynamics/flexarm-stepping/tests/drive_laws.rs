@@ -31,21 +31,24 @@ fn friction_slope_is_the_derivative_of_its_torque() {
     }
 }
 
-/// The torque of a curve is the derivative of its work, and its slope that of the torque; a slider adds
-/// its spring up to its reach.
+/// The torque of a curve is the derivative of its work, and its slope that of the torque, by central
+/// differences.
 #[test]
 fn torque_and_slope_of_a_curve_are_derivatives_of_its_work() {
     let curve = TorqueCurve::new(&[[-0.02, -90.0], [-0.005, -6.0], [0.004, 6.0], [0.03, 150.0]]).unwrap();
+    let mut worst = [0.0_f64; 2];
     for e in [-0.05, -0.011, -0.001, 0.002, 0.013, 0.04] {
         let h = 1e-7;
         let torque = (curve.energy(e + h) - curve.energy(e - h)) / (2.0 * h);
         let slope = (curve.torque(e + h) - curve.torque(e - h)) / (2.0 * h);
-        assert!((torque - curve.torque(e)).abs() < 1e-6 * (1.0 + curve.torque(e).abs()), "{e} {torque}");
-        assert!((slope / curve.slope(e) - 1.0).abs() < 1e-6, "{e} {slope}");
+        worst[0] = worst[0].max((torque / curve.torque(e) - 1.0).abs());
+        worst[1] = worst[1].max((slope / curve.slope(e) - 1.0).abs());
         // Scaled by two, all of them double.
         let twice = curve.scaled(2.0);
         assert_eq!([twice.torque(e), twice.slope(e)], [2.0 * curve.torque(e), 2.0 * curve.slope(e)]);
     }
+    eprintln!("{worst:?}");
+    assert!(worst.iter().all(|worst| *worst < 1e-9), "{worst:?}"); // measured 2.8e-11 and 3.1e-11
 }
 
 /// Truth: stiffness, damping and inertia of motors on joints keep the energy, `qᵀ K q = θᵀ K_m θ` with
@@ -61,7 +64,9 @@ fn coupled_gears_keep_energy_and_power() {
     let theta = DVector::from_vec(vec![0.3, -0.7, 1.1]);
     let (q, tau) = (&coupling.C * &theta, DVector::from_vec(vec![12.0, -30.0, 7.0]));
     let energy: f64 = k.iter().zip(theta.iter()).map(|(k, t)| k * t * t).sum();
-    assert!((q.dot(&(&K * &q)) / energy - 1.0).abs() < 1e-13); // measured 2.2e-16
+    let of_energy = (q.dot(&(&K * &q)) / energy - 1.0).abs();
     let motors = DVector::from_vec(coupling.motor_torques(tau.as_slice()));
-    assert!((motors.dot(&theta) - tau.dot(&q)).abs() < 1e-12); // measured 3.6e-15
+    let of_power = (motors.dot(&theta) - tau.dot(&q)).abs();
+    eprintln!("{of_energy:.1e} {of_power:.1e}");
+    assert!(of_energy < 1e-13 && of_power < 1e-12, "{of_energy:e} {of_power:e}"); // measured 0 and 0
 }

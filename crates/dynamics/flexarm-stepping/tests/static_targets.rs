@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use flexarm_kinematics::{Frame, Model, Wrench, rotation_vector};
-use flexarm_stepping::{Damping, Held, OperatingPoint, Plant, StaticTargets, linearise, static_targets};
+use flexarm_stepping::{
+    Damping, EquationsOfMotion, Held, OperatingPoint, Plant, StaticTargets, linearise, static_targets,
+};
 use flexarm_testkit::reference_arm;
 use nalgebra::{Vector3, Vector6};
 
@@ -77,4 +79,28 @@ fn the_tool_at_rest_moves_with_each_command_as_its_equilibrium_does() {
         eprintln!("joint {}: {error:.1e}", k + 1);
         assert!(error < 1e-8, "joint {}: {error:e}", k + 1);
     }
+}
+
+/// A wrong number of joints ended in a slice of another length; wrong vectors gave numbers for some.
+#[test]
+fn vectors_of_another_length_than_the_arm_are_refused_with_both_lengths() {
+    let (plant, tool) = plant(1.0);
+    for length in [0, 5, 7] {
+        let error = static_targets(&plant, &tool, &vec![0.1; length], &Wrench::zeros(), 0.0, &[true; 6]).unwrap_err();
+        assert_eq!(error.to_string(), format!("{length} joint positions are given, the arm has 6 joints"));
+    }
+    let refused = |expected: &str, call: &mut dyn FnMut()| {
+        let panic = std::panic::catch_unwind(std::panic::AssertUnwindSafe(call)).expect_err(expected);
+        let text = panic.downcast_ref::<String>().unwrap();
+        assert!(text.contains(expected), "{text}");
+    };
+    let mut at = OperatingPoint::new(plant.clone(), tool);
+    at.solve(&POSE, &Wrench::zeros()).unwrap();
+    let inertia = plant.model.bodies()[1].inertia;
+    refused("p has 11 entries, the arm has 12 elastic coordinates", &mut || {
+        at.add_weight(1, &inertia, &mut [0.0; 11]);
+    });
+    let mut equations = EquationsOfMotion::at_rest(plant).unwrap();
+    let x = equations.x().to_vec();
+    refused("v has 13 entries, the arm has 12 free coordinates", &mut || equations.set_state(&x, &[0.0; 13]));
 }

@@ -98,7 +98,6 @@ impl Body {
     }
 
     /// `X_PB` of a single-DoF joint, for any scalar type.
-    #[inline(always)]
     pub(crate) fn along_axis<T: Real>(&self, motion: AxisMotion, coordinate: T) -> Pose<T> {
         let value = T::splat(self.ratio) * coordinate + T::splat(self.offset);
         let mut X_PB = identity();

@@ -124,7 +124,6 @@ pub fn cholesky<T: Real>(A: &mut [T], n: usize) -> T {
 }
 
 /// Replaces A by its factor and `Bᵀ` by `A^-1 B`; returns false if A is not positive definite.
-#[inline(always)]
 pub(crate) fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
     let positive = cholesky(A, n) == 1.0;
     solve_transposed(A, Bt, n);
@@ -134,7 +133,6 @@ pub(crate) fn solve_in_place(A: &mut [f64], Bt: &mut [f64], n: usize) -> bool {
 
 /// Solves `A X = B` with the factor of A, from `Bᵀ` to `Xᵀ`: in transposed form, elimination works
 /// on whole columns.
-#[inline(always)]
 pub fn solve_transposed(L: &[f64], Bt: &mut [f64], n: usize) {
     for k in 0..n {
         let (inward, outward) = Bt.split_at_mut(k * n);
@@ -166,7 +164,6 @@ fn subtract<T: Real>(to: &mut [T], factor: T, from: &[T]) {
 }
 
 /// Computes `Eᵀ Z E` with `E = 1 + c X` for a symmetric Z, into `product`; all are n × n.
-#[inline(always)]
 pub fn congruence(c: f64, X: &[f64], Z: &[f64], n: usize, workspaces: [&mut [f64]; 2], product: &mut [f64]) {
     let [ZE, Xt] = workspaces;
     if n == 0 {
@@ -214,7 +211,6 @@ pub fn largest<T: Real>(x: &[T]) -> T {
 }
 
 /// Returns the maximum absolute value; infinite if an entry is not finite.
-#[inline(always)]
 pub fn largest_of_numbers(x: &[f64]) -> f64 {
     let (mut most, mut broken) = ([0.0; 4], [0.0; 4]);
     let fours = x.chunks_exact(4);
@@ -326,7 +322,6 @@ impl<T: Real> Factor<T> {
 }
 
 /// Computes `A ← Aᵀ`.
-#[inline(always)]
 pub fn transpose(A: &mut [f64], n: usize) {
     for j in 0..n {
         for i in j + 1..n {

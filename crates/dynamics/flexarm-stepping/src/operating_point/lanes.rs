@@ -15,8 +15,9 @@ use nalgebra::DMatrix;
 
 use super::each::{PoseAnswer, PoseOutputs};
 use super::tangent::{Tangent, to_hertz};
-use super::{MAX_ITERATIONS, OperatingPoint, SLOW, settled};
+use super::{MAX_ITERATIONS, OperatingPoint, SLOW};
 use crate::dense::{Factor, larger, largest};
+use crate::equilibrium::settled;
 use crate::plant::Plant;
 use crate::statics::{add_wrench, load_at};
 

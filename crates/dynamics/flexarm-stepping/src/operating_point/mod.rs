@@ -22,7 +22,7 @@ use flexarm_kinematics::{
 use nalgebra::{DMatrix, DVector, Matrix6, Matrix6xX};
 
 use crate::dense::Factor;
-use crate::equilibrium::MAX_HALVINGS;
+use crate::equilibrium::{MAX_HALVINGS, settled};
 use crate::error::StepError;
 use crate::linear::loaded_equilibrium;
 use crate::motion::Held;
@@ -31,8 +31,6 @@ use crate::statics::{StaticSlopes, add_spring_forces, static_forces};
 pub use each::{PoseAnswer, PoseOutputs};
 use tangent::{Tangent, to_hertz};
 
-/// Accepted unbalanced force relative to the largest force.
-const TOLERANCE: f64 = 1e-13;
 /// Maximum number of Newton iterations.
 const MAX_ITERATIONS: usize = 60;
 /// Residual reduction of a step above which the tangent is renewed.
@@ -76,11 +74,6 @@ pub struct OperatingPoint {
 /// Returns the error for an equilibrium whose tangent is not positive definite: it is unstable.
 fn beyond_buckling() -> StepError {
     StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 }
-}
-
-/// Returns whether the iteration has converged.
-fn settled(iteration: usize, residual: f64, previous: f64) -> bool {
-    residual <= TOLERANCE || (iteration > 2 && residual < 1e-9 && residual >= 0.5 * previous)
 }
 
 impl OperatingPoint {

@@ -186,10 +186,16 @@ pub fn new_stepper(
     h: f64,
     start: Start,
 ) -> Result<Box<dyn Stepper>, StepError> {
+    let (plant, e) = at_start(plant.into(), h, start)?;
+    kind.method().start(plant, h, &e)
+}
+
+/// Checks the step size and returns the arm at `t = 0`, with the inertias that are due there, and its
+/// elastic coordinates.
+pub(crate) fn at_start(mut plant: Arc<Plant>, h: f64, start: Start) -> Result<(Arc<Plant>, DVector<f64>), StepError> {
     if !(h.is_finite() && h > 0.0) {
         return Err(StepError::Setup(format!("the step must be a positive time in seconds, found {h}")));
     }
-    let mut plant = plant.into();
     if !plant.inertia_changes.is_empty() {
         Arc::make_mut(&mut plant).carry_from_start()?;
     }
@@ -197,5 +203,5 @@ pub fn new_stepper(
         Start::Equilibrium => static_equilibrium(&plant, 0.0)?,
         Start::Undeformed => DVector::zeros(plant.model.n_elastic()),
     };
-    kind.method().start(plant, h, &e)
+    Ok((plant, e))
 }

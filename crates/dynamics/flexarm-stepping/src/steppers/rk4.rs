@@ -5,7 +5,7 @@
 
 use std::sync::Arc;
 
-use flexarm_kinematics::{Data, State, mass_matrix};
+use flexarm_kinematics::{Data, mass_matrix};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::StepError;
@@ -188,12 +188,10 @@ fn fastest_decay(damping: f64, omega: f64) -> f64 {
 /// free, without Coulomb and Stribeck friction.
 fn free_rates(plant: &Plant) -> Result<(f64, f64), StepError> {
     let (model, na) = (&plant.model, plant.model.n_actuated());
-    let (mut state, mut qddot) = (State::zeros(model), DVector::zeros(model.nv()));
-    plant.prescribed_state(0.0, &mut state, &mut qddot);
-    state.q.rows_mut(na, plant.modes.equilibrium.len()).copy_from(&plant.modes.equilibrium);
     let mut data = Data::new(model);
     // M, K and D over the driven joints and the elastic coordinates; driven joints have no spring.
-    let M = mass_matrix(model, &mut data, &state.q);
+    let q = plant.coordinates_at(0.0, &plant.modes.equilibrium);
+    let M = mass_matrix(model, &mut data, &q);
     let free: Vec<usize> = plant.torque_driven.iter().copied().chain(na..model.nv()).collect();
     let (n, driven) = (free.len(), plant.torque_driven.len());
     let M = DMatrix::from_fn(n, n, |i, j| M[(free[i], free[j])]);

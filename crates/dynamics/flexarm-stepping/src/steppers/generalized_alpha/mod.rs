@@ -218,7 +218,6 @@ impl Coefficients {
     }
 
     /// Returns x⁺ and v⁺ by (4), (2), (3) from x, v, a and x̃ of one coordinate and x̃⁺.
-    #[inline(always)]
     pub(crate) fn advance(&self, h: f64, x: f64, v: f64, a: f64, x_tilde: f64, x_tilde_new: f64) -> (f64, f64) {
         let Self { alpha_m, alpha_f, beta, gamma } = *self;
         let ratio = (1.0 - alpha_f) / (1.0 - alpha_m);
@@ -227,7 +226,6 @@ impl Coefficients {
     }
 
     /// Returns a⁺ of (4).
-    #[inline(always)]
     pub(crate) fn remembered(&self, a: f64, x_tilde: f64, x_tilde_new: f64) -> f64 {
         let Self { alpha_m, alpha_f, .. } = *self;
         ((1.0 - alpha_f) * x_tilde_new + alpha_f * x_tilde - alpha_m * a) / (1.0 - alpha_m)
