@@ -28,5 +28,6 @@ pub(crate) use quadrature::gauss_jacobi;
 pub(crate) use quadrature::{TetRule, tet_points};
 pub use rules::Quadrature;
 pub(crate) use rules::{Point, Purpose, for_each_point};
-pub(crate) use shape::{edges, reference_nodes, shape_functions};
+pub use shape::edges;
+pub(crate) use shape::{reference_nodes, shape_functions};
 pub(crate) use solid::{ElementWorkspace, mode_gradients_at};

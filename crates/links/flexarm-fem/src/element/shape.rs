@@ -84,7 +84,7 @@ pub(crate) fn reference_nodes(kind: ElementKind) -> &'static [[f64; 3]] {
 ///
 /// # Panics
 /// For a beam.
-pub(crate) fn edges(kind: ElementKind) -> &'static [[usize; 2]] {
+pub fn edges(kind: ElementKind) -> &'static [[usize; 2]] {
     match kind {
         ElementKind::Tet4 | ElementKind::Tet10 => &TET_EDGES,
         ElementKind::Hex8 | ElementKind::Hex20 => &HEX_EDGES,

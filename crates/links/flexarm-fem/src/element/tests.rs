@@ -196,7 +196,7 @@ fn mass_of_straight_tetrahedra_is_the_closed_form() {
     let ((_, M), volume_4) = (matrices(Tet4, &x, Quadrature::Exact), volume(&x));
     let scale = STEEL.rho * volume_4 / 20.0;
     let exact = DMatrix::from_fn(4, 4, |i, j| if i == j { 2.0 * scale } else { scale });
-    assert!((&M - &exact).amax() < 1e-13 * exact.amax()); // measured MM1
+    assert!((&M - &exact).amax() < 1e-13 * exact.amax());
 
     let x = distorted(Tet10, 0.0, 17);
     let ((_, M), volume) = (matrices(Tet10, &x, Quadrature::Exact), volume(&x));
@@ -212,7 +212,7 @@ fn mass_of_straight_tetrahedra_is_the_closed_form() {
         };
         STEEL.rho * volume / 420.0 * factor
     });
-    assert!((&M - &exact).amax() < 1e-13 * exact.amax()); // measured MM2
+    assert!((&M - &exact).amax() < 1e-13 * exact.amax());
 }
 
 /// Second algorithm: mass of curved elements by a rule of much higher degree.
