@@ -45,7 +45,6 @@ mod robot_file_docs;
 mod run_says;
 mod settling;
 mod small_robots;
-mod springs;
 mod standard_motions;
 mod stepper_settings;
 mod stress;
