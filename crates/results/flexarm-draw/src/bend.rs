@@ -5,11 +5,15 @@
 //! (Euler-Bernoulli). For loads at the ends this is the exact deflection line; at the stations it
 //! is exact for every model. Before the first station and beyond the last one the surface moves
 //! rigidly with that station.
+//!
+//! Start at [`BendLine`] and [`BentMesh`]. Frames: L link, S station; all vectors in L, in m.
+//! Not here: the motion of the stations (`flexarm_run`), magnification ([`crate::Magnifier`]).
 
-use flexarm_spatial::{Pose, rotation_vector};
-use nalgebra::{Point3, Rotation3, Translation3, Vector3};
+use std::collections::HashMap;
 
 use flexarm_sample::{BendInfo, LinkMesh};
+use flexarm_spatial::{Pose, rotation_vector};
+use nalgebra::{Point3, Rotation3, Translation3, Vector3};
 
 /// Number of slabs into which a surface is cut along the link, so that it can deform.
 const SLABS: f64 = 12.0;
@@ -39,13 +43,15 @@ impl BendLine {
         along.windows(2).all(|pair| pair[1] > pair[0]).then_some(Self { stations, axis, along })
     }
 
-    /// Returns the position of a point of the link along its line (m), 0 at the first station.
+    /// Returns the position of a point `p_L` of the link along its line (m): 0 at the first
+    /// station, negative before it.
     #[must_use]
-    pub fn place(&self, point: &Vector3<f64>) -> f64 {
-        self.axis.dot(&(point - self.stations[0]))
+    pub fn place(&self, p_L: &Vector3<f64>) -> f64 {
+        self.axis.dot(&(p_L - self.stations[0]))
     }
 
-    /// Returns the undeformed point at `s` metres along the line (link axes).
+    /// Returns the undeformed point at `s` metres along the line, in L (m). Before the first
+    /// station and beyond the last one the outer pieces are continued.
     #[must_use]
     pub fn point(&self, s: f64) -> Point3<f64> {
         let last = self.stations.len() - 1;
@@ -60,10 +66,16 @@ impl BendLine {
         self.along[self.along.len() - 1]
     }
 
-    /// Returns the line with its stations moved to `moved` (poses in the link, rotations relative
-    /// to link axes).
+    /// Returns the line with its stations moved.
+    ///
+    /// * `moved`: pose of each station in L; its rotation is that of the section, the identity
+    ///   where nothing bends.
+    ///
+    /// # Panics
+    /// If there is not one pose per station.
     #[must_use]
     pub fn bent<'a>(&'a self, moved: &'a [Pose]) -> BentLine<'a> {
+        assert_eq!(moved.len(), self.stations.len(), "a pose of each station of the line");
         let end = |(X, station): (&Pose, &Vector3<f64>)| {
             (X.translation.vector - station, rotation_vector(X.rotation.matrix()))
         };
@@ -81,13 +93,14 @@ pub struct BentLine<'a> {
 }
 
 impl BentLine<'_> {
-    /// Returns the deformed position of a point of the undeformed link (link axes).
+    /// Returns the deformed position, in L (m), of the point `p_L` of the undeformed link.
     #[must_use]
-    pub fn deformed(&self, point: &Vector3<f64>) -> Vector3<f64> {
-        self.section(self.line.place(point)).transform_point(&Point3::from(*point)).coords
+    pub fn deformed(&self, p_L: &Vector3<f64>) -> Vector3<f64> {
+        self.section(self.line.place(p_L)).transform_point(&Point3::from(*p_L)).coords
     }
 
-    /// Returns the motion of the section at `s` metres along the line (link axes).
+    /// Returns the motion of the section at `s` metres along the line: the pose that maps its
+    /// undeformed points to the deformed ones, both in L (m).
     #[must_use]
     pub fn section(&self, s: f64) -> Pose {
         match self.between(s) {
@@ -157,7 +170,7 @@ impl Piece {
         self.direction * (self.direction.dot(a) * (1.0 - self.x) + self.direction.dot(b) * self.x)
     }
 
-    /// Displacement of the position (m).
+    /// Displacement of the position (m): linear along the line, cubic Hermite polynomial across it.
     fn moved(&self) -> Vector3<f64> {
         let [v0, v1, slope0, slope1] = self.hermite();
         let x = self.x;
@@ -169,7 +182,7 @@ impl Piece {
         self.mixed(&self.ends[0].0, &self.ends[1].0) + deflection
     }
 
-    /// Rotation of the section: slope of the line, and twist.
+    /// Rotation of the section: slope of the line, the derivative of [`Piece::moved`], and twist.
     fn turn(&self) -> Rotation3<f64> {
         let [v0, v1, slope0, slope1] = self.hermite();
         let x = self.x;
@@ -228,7 +241,7 @@ impl BentMesh {
         &self.line
     }
 
-    /// Returns the corners in link axes (m) for stations moved to `moved` (poses in the link).
+    /// Returns the corners in L (m) for stations moved to `moved`, as [`BendLine::bent`].
     pub fn positions<'a>(&'a self, moved: &[Pose]) -> impl Iterator<Item = [f32; 3]> + 'a {
         let bent = self.line.bent(moved);
         let at = |k: usize| bent.section(self.line.length() * k as f64 / SECTIONS as f64);
@@ -270,7 +283,6 @@ impl BentPieces {
 
 /// Halves edges until none spans more than one slab of the flexible part of the link.
 fn cut_along(mesh: &mut LinkMesh, line: &BendLine) {
-    use std::collections::HashMap;
     let (slab, most) = (line.length() / SLABS, mesh.triangles.len().max(64) * GROWTH);
     let with_normals = mesh.normals.len() == mesh.positions.len();
     let place = |p: &[f32; 3]| line.place(&Vector3::from(p.map(f64::from))).clamp(0.0, line.length());

@@ -118,6 +118,7 @@ pub fn effects(rows: &[Vec<EffectPanel<'_>>]) -> String {
     };
     let (left, height) = (most(&beside) + 4, 12 + PANEL + MARGIN[1] + most(&below));
     let color = ink(palette::series(0, Ground::Paper));
+    // A line through the means with their standard errors, labels below and on the left.
     let draw = |area: &Area<'_>| {
         for (row, panels) in (0..).zip(rows) {
             let top = 12 + height * row;
@@ -225,12 +226,14 @@ pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
                 let part = area.clone().shrink((left, top), (cell - 4, cell - 4));
                 let middle = (cell / 2) as i32 - 2;
                 match column.cmp(&row) {
+                    // Points of the column over those of the row.
                     Ordering::Less => {
                         let ranges = (range(x.iter().copied()), range(y.iter().copied()));
                         let mut chart = ChartBuilder::on(&part).build_cartesian_2d(ranges.0, ranges.1)?;
                         let points: Vec<[f64; 2]> = x.iter().zip(*y).map(|(x, y)| [*x, *y]).collect();
                         chart.draw_series(dots(&points, 1, color.mix(0.6).filled()))?;
                     }
+                    // Histogram behind the name, with space for it.
                     Ordering::Equal => {
                         let (range, bars) = (range(x.iter().copied()), bars(x, range(x.iter().copied()), BINS));
                         let most = bars.iter().map(|[_, (_, count)]| *count).fold(1.0, f64::max);
@@ -238,6 +241,7 @@ pub fn scatter_matrix(columns: &[(&str, &[f64])]) -> String {
                         chart.draw_series(bars.into_iter().map(|bar| Rectangle::new(bar, BIN.filled())))?;
                         draw_lines(&part, (cell / 2 - 2, 4), &wrapped(name, (cell / 7) as usize), false)?;
                     }
+                    // Rank correlation, larger where it is stronger.
                     Ordering::Greater => {
                         let rank = rank_correlation(x, y);
                         let font = ("sans-serif", 12 + (12.0 * rank.abs()) as i32).into_font();
@@ -287,7 +291,8 @@ pub fn bars(values: &[f64], range: Range<f64>, bins: usize) -> Vec<[(f64, f64); 
     counts.iter().enumerate().map(|(k, count)| [(edge(k), 0.0), (edge(k + 1), *count as f64)]).collect()
 }
 
-/// Computes Spearman's rank correlation; NaN if one of the two is constant.
+/// Computes Spearman's rank correlation, from -1 to 1, of the pairs that are finite; NaN if one of
+/// the two is constant. Equal values share their mean rank.
 pub fn rank_correlation(x: &[f64], y: &[f64]) -> f64 {
     let pairs: Vec<(f64, f64)> =
         x.iter().copied().zip(y.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect();

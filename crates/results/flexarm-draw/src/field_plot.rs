@@ -2,7 +2,8 @@
 //!
 //! Neighbouring cells of one colour in a row are drawn as one rectangle. Grids finer than the
 //! picture are thinned to the maximum of the merged cells, so that a page with many maps stays
-//! small.
+//! small. Start at [`FieldPlot`]. Not here: curves ([`crate::LinePlot`]), charts
+//! ([`crate::charts`]).
 
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
@@ -56,11 +57,26 @@ pub struct FieldPlot<'a> {
     pub names: Option<[&'a [String]; 2]>,
 }
 
+/// Drawn cells, along both axes.
+struct Cells {
+    /// Number of cells of the grid in a drawn one.
+    every: [usize; 2],
+    /// Number of drawn cells.
+    shown: [usize; 2],
+    /// Size of a drawn cell, lower edge of the first, and size of all, in units of the axis.
+    step: [f64; 2],
+    edge: [f64; 2],
+    span: [f64; 2],
+    /// Size of a drawn cell in pixels.
+    pixels: [u32; 2],
+}
+
 impl FieldPlot<'_> {
     /// Returns the text of an SVG file; empty if there is no finite value.
     #[must_use]
     pub fn svg(&self) -> String {
         let finite = || self.values.iter().copied().filter(|x| x.is_finite());
+        // Range of the scale, and cells by name with ranges of their own.
         let [low, high] = self
             .scale
             .unwrap_or_else(|| [finite().fold(f64::INFINITY, f64::min), finite().fold(f64::NEG_INFINITY, f64::max)]);
@@ -79,8 +95,9 @@ impl FieldPlot<'_> {
         named.draw([low, high]).unwrap_or_default()
     }
 
-    fn draw(&self, scale: [f64; 2]) -> Result<String, PlotError> {
-        // Drawn cells, each a whole number of pixels.
+    /// Sizes of the drawn cells.
+    fn cells(&self) -> Cells {
+        // A grid finer than the picture is thinned.
         let every = if self.names.is_some() { [1, 1] } else { self.count.map(|n| n.div_ceil(MAX_CELLS)) };
         let shown = [0, 1].map(|k| self.count[k].div_ceil(every[k]));
         let steps = [0, 1].map(|k| {
@@ -92,14 +109,20 @@ impl FieldPlot<'_> {
         let edge = [0, 1].map(|k| self.ranges[k][0] - 0.5 * step[k]);
         let step = [0, 1].map(|k| step[k] * every[k] as f64);
         let span = [0, 1].map(|k| step[k] * shown[k] as f64);
+        // Each cell has a whole number of pixels.
         let field = [0, 1].map(|k| match self.names {
             Some(_) => NAMED_FIELD[k].clamp(14.0 * shown[k] as f64, [96.0, 120.0][k] * shown[k] as f64),
             None if self.equal => FIELD * span[k] / span[0].max(span[1]),
             None => FIELD,
         });
-        let cell = [0, 1].map(|k| (field[k] / shown[k] as f64).round().max(1.0) as u32);
-        let [width, height] = [0, 1].map(|k| cell[k] * shown[k] as u32);
+        let pixels = [0, 1].map(|k| (field[k] / shown[k] as f64).round().max(1.0) as u32);
+        Cells { every, shown, step, edge, span, pixels }
+    }
 
+    fn draw(&self, scale: [f64; 2]) -> Result<String, PlotError> {
+        let Cells { every, shown, step, edge, span, pixels } = self.cells();
+        let [width, height] = [0, 1].map(|k| pixels[k] * shown[k] as u32);
+        // Size of the picture with labels and scale.
         let x_label = wrapped(self.labels[0], (width + RIGHT) as usize / 7);
         let y_label = wrapped(self.labels[1], (height + FOOT) as usize / 7);
         let left = 52 + LEADING * y_label.len() as u32;
@@ -113,6 +136,7 @@ impl FieldPlot<'_> {
             let ranges = [0, 1].map(|k| edge[k]..edge[k] + span[k]);
             let names = [0, 1].map(|k| self.names.map(|names| names[k]));
             let mut chart = axes(&part, Axes { ranges, margin: [left, FOOT], names })?;
+            // Row by row: rectangles of one colour, then numbers in named cells.
             for j in 0..shown[1] {
                 let largest: Vec<f64> = (0..shown[0]).map(|i| self.largest([i, j], every)).collect();
                 let mut end = 0;
@@ -125,7 +149,7 @@ impl FieldPlot<'_> {
                     }
                 }
                 for (i, value) in largest.iter().enumerate().filter(|(_, value)| value.is_finite()) {
-                    if self.names.is_some() && cell[0] >= 44 && cell[1] >= 16 {
+                    if self.names.is_some() && pixels[0] >= 44 && pixels[1] >= 16 {
                         let letters = if shade(*value, scale) < Some(SHADES / 2) { WHITE } else { INK };
                         let style = centred(("sans-serif", 13).into_font().color(&letters));
                         chart.draw_series([Text::new(plain(three_digits(*value)), (i as f64, j as f64), style)])?;

@@ -61,6 +61,8 @@ pub mod internals {
     #[cfg(feature = "png")]
     pub use crate::mesh_picture::stress_sheet::{is_visible, side_of_worst};
     #[cfg(feature = "png")]
+    pub use crate::mesh_picture::topology::prism;
+    #[cfg(feature = "png")]
     pub use crate::mesh_picture::view::LinkAxes;
     pub use crate::plot::ranges::equally_long;
     pub use crate::plot::style::PLAN;

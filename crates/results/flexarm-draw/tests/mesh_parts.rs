@@ -1,7 +1,7 @@
 //! Parts of mesh pictures: views, numbers, visibility, rasterisation.
 
 use flexarm_draw::internals::{
-    LinkAxes, cover, displacement, displacements, is_visible, position, rotations, round_below, side_of_worst,
+    LinkAxes, cover, displacement, displacements, is_visible, position, prism, rotations, round_below, side_of_worst,
 };
 use flexarm_draw::mesh_picture::{StressPicture, View, stress_sheet};
 use nalgebra::Vector3;
@@ -56,6 +56,23 @@ fn the_worst_place_is_on_the_first_side() {
     let image = stress_sheet(&picture);
     assert!(!image.to_png().unwrap().is_empty());
     assert_eq!(image.to_png().unwrap(), stress_sheet(&picture).to_png().unwrap());
+}
+
+/// Truth: n/2 r² sin(2π/n) l, against the sum of tetrahedra, which is right only if every side
+/// faces outward.
+#[test]
+fn a_rod_encloses_the_area_of_its_polygon_times_its_length() {
+    let (from, to, radius, n) = (Vector3::new(0.3, -0.2, 0.1), Vector3::new(0.5, 0.4, 0.9), 0.07, 8);
+    let (positions, triangles) = prism([&from, &to], radius, n, 0.0).unwrap();
+    let tetrahedron = |corners: &[u32; 3]| {
+        let [a, b, c] = corners.map(|corner| positions[corner as usize]);
+        a.dot(&b.cross(&c)) / 6.0
+    };
+    let volume: f64 = triangles.iter().map(tetrahedron).sum();
+    let area = 0.5 * f64::from(n) * radius * radius * (std::f64::consts::TAU / f64::from(n)).sin();
+    let error = volume / (area * (to - from).norm()) - 1.0;
+    assert!(error.abs() < 1e-13, "{error:e}");
+    assert_eq!(prism([&from, &from], radius, n, 1e-6), None);
 }
 
 /// Truth: the weighted corners give the sample; by Pick's theorem a triangle of area 6 with 8

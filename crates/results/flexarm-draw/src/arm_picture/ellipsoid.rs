@@ -1,4 +1,4 @@
-//! Ellipsoid of the compliance at the TCP.
+//! Ellipsoid of the compliance at the TCP: its image in a view, and its principal axes. World axes.
 
 use nalgebra::{Matrix2x3, Matrix3, SymmetricEigen, Vector3};
 
@@ -21,7 +21,8 @@ const OUTLINE_PIECES: usize = 96;
 const ELLIPSOID_COLOR: Rgb = [126, 46, 132];
 
 impl Ellipsoid {
-    /// `None` for a rigid arm.
+    /// Scales the ellipsoid of the compliance `C` (m/N, W axes) to the size of the arm (m); `None`
+    /// for a rigid arm.
     pub fn new(C: &Matrix3<f64>, size: f64) -> Option<Self> {
         let eigen = SymmetricEigen::new(0.5 * (C + C.transpose()));
         let largest = eigen.eigenvalues.amax();

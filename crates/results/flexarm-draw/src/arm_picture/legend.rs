@@ -29,6 +29,7 @@ pub fn on_scale(share: f64) -> f64 {
 pub(super) fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHeader, factor: f64) {
     let (width, height) = (image.width as f64, image.height as f64);
     let text = |size: f64| Style::new(size * unit, color::INK);
+    // Axes of the world; nearer ones cover those farther from the viewer.
     let origin = [44.0 * unit, height - 40.0 * unit];
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| view.toward[*a].total_cmp(&view.toward[*b]));
@@ -45,6 +46,7 @@ pub(super) fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHead
         image.text(["x", "y", "z"][k], [x, y + 5.0 * unit], Align::Middle, style);
     }
 
+    // Colour scale with three numbers.
     let (bar, left, top) = (240.0 * unit, width - 286.0 * unit, height - 42.0 * unit);
     let thick = 11.0 * unit;
     for x in 0..bar as usize {
@@ -58,6 +60,7 @@ pub(super) fn legend(image: &mut Image, view: &View, unit: f64, header: &RunHead
     }
     image.text("deviation from the rigid arm, mm", [left, top - 7.0 * unit], Align::Left, text(13.0));
 
+    // Caption: magnification, rigid twin, arrow of the error.
     let (x, y) = (104.0 * unit, height - 24.0 * unit);
     let bold = text(14.0).bold();
     let first = format!("deflections magnified {} times", short(factor));

@@ -171,6 +171,7 @@ pub struct Stage {
 impl Stage {
     /// Returns the surfaces, if both arms can be drawn.
     pub fn new(header: &RunHeader, sample: &Sample) -> Result<Self, ArmPictureError> {
+        // Surfaces of the rigid, the flexible and the magnified arm, with the same corners.
         check(header, sample)?;
         let bodies = bodies(header, sample);
         let magnifier = Magnifier::new(header);
@@ -185,6 +186,7 @@ impl Stage {
         if ![&rigid, &real, &shown].into_iter().all(finite) {
             return Err(ArmPictureError::NotFinite);
         }
+        // Colours by the distance between flexible and rigid corners.
         let peak = if header.color_scale_m > 0.0 { header.color_scale_m } else { 1.0 };
         let deviation = real.positions.iter().zip(&rigid.positions).map(|(a, b)| (a - b).norm());
         let values = deviation.map(|d| on_scale((d / peak).min(1.0))).collect();

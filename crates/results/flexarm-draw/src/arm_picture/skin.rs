@@ -1,10 +1,14 @@
 //! Surfaces of the arm in the world: meshes of the links, or rods.
+//!
+//! Start at [`bodies`] and [`Skin`]. Frames: W world, L link, P parent link, C child, T tool; in m.
+//! Not here: cutting and bending of a surface ([`crate::BentMesh`]), drawing ([`super::Stage`]).
 
+use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
 use flexarm_spatial::Pose;
 use nalgebra::{Point3, Vector3};
 
+use crate::mesh_picture::topology::prism;
 use crate::{BentMesh, stations_in_link};
-use flexarm_sample::{BendInfo, LinkMesh, RunHeader, Sample, TwinSample};
 
 /// Radius of the rods drawn for links, as a share of the size of the arm.
 const ROD: f64 = 0.012;
@@ -14,12 +18,14 @@ const ROD_SIDES: u32 = 10;
 /// A surface attached to a link, deformed with it if the link is flexible.
 pub(super) struct Body {
     link: usize,
+    /// Deformable surface, and index of its first station and their number.
     bent: Option<(BentMesh, usize, usize)>,
     mesh: LinkMesh,
 }
 
 /// Returns the surfaces of the arm, cut for deformation; rods if there are none.
 pub(super) fn bodies(header: &RunHeader, sample: &Sample) -> Vec<Body> {
+    // Rods from each link to its children, and to the tool.
     let mut meshes = header.meshes.clone();
     let size = reach(&sample.rigid);
     if meshes.is_empty() {
@@ -33,6 +39,7 @@ pub(super) fn bodies(header: &RunHeader, sample: &Sample) -> Vec<Body> {
         let X_LT = sample.rigid.X_WL[link].inv_mul(&sample.rigid.X_WT);
         meshes.extend(rod(link, &Vector3::zeros(), &X_LT.translation.vector, 0.5 * ROD * size));
     }
+    // Index of the first station of each bend.
     let mut firsts = Vec::new();
     let mut first = 0;
     for bend in &header.bends {
@@ -57,24 +64,8 @@ pub(super) fn reach(twin: &TwinSample) -> f64 {
 
 /// Creates a prism between two points of a link; `None` if they coincide.
 fn rod(link: usize, from: &Vector3<f64>, to: &Vector3<f64>, radius: f64) -> Option<LinkMesh> {
-    let along = (to - from).try_normalize(1e-6)?;
-    let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
-    let z = along.cross(&y);
-    let mut positions = Vec::new();
-    for end in [from, to] {
-        for k in 0..ROD_SIDES {
-            let (sin, cos) = (f64::from(k) / f64::from(ROD_SIDES) * std::f64::consts::TAU).sin_cos();
-            let p: Vector3<f64> = end + (y * cos + z * sin) * radius;
-            positions.push([p.x as f32, p.y as f32, p.z as f32]);
-        }
-    }
-    let n = ROD_SIDES;
-    let sides = (0..n).flat_map(|k| {
-        let next = (k + 1) % n;
-        [[k, next, n + next], [k, n + next, n + k]]
-    });
-    let caps = (2..n).flat_map(|k| [[0, k, k - 1], [n, n + k - 1, n + k]]);
-    let triangles = sides.chain(caps).collect();
+    let (positions, triangles) = prism([from, to], radius, ROD_SIDES, 1e-6)?;
+    let positions = positions.iter().map(|p| p.map(|x| x as f32).into()).collect();
     Some(LinkMesh { link, name: "rod".into(), positions, normals: Vec::new(), triangles, color: [0.7; 4], file: None })
 }
 

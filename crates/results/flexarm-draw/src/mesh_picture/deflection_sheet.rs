@@ -1,4 +1,7 @@
-//! The sheets of link deformations: six unit loads at B, and modes with A held.
+//! The sheets of link deformations: six unit loads at B, and modes with A clamped.
+//!
+//! Start at [`unit_loads`] and [`modes`]; both draw six [`Panel`]s. Displacements in link axes,
+//! drawn with one scale per panel. Not here: drawing of triangles ([`super::scene`]).
 
 use nalgebra::{Point3, Vector3, Vector6};
 use rayon::prelude::*;
@@ -81,6 +84,7 @@ pub(super) fn unit_loads(pictures: &MeshPictures<'_>) -> Image {
 /// Draws the sheet of modes.
 pub(super) fn modes(pictures: &MeshPictures<'_>) -> Result<Image, PictureError> {
     let (link, modes) = (&pictures.reduction.link, &pictures.reduction.held_modes);
+    // The checks have the frequencies of the reduced models for comparison.
     let checks = link.details.as_ref().and_then(|details| details.gate.as_ref()).map(|gate| gate.modes.as_slice());
     let panels: Vec<Panel> = modes
         .frequencies_hz()
@@ -117,6 +121,7 @@ pub(super) fn modes(pictures: &MeshPictures<'_>) -> Result<Image, PictureError> 
     Ok(draw(pictures, &format!("{}: modes with {base} held", link.name), "shapes have no size of their own", panels))
 }
 
+/// Draws the panels on a sheet, with lines between them.
 fn draw(pictures: &MeshPictures<'_>, title: &str, remark: &str, panels: Vec<Panel>) -> Image {
     let mut sheet = sheet::sheet(title, remark);
     let tied: Vec<_> = pictures.interfaces.iter().map(|i| pictures.surface.tied(pictures.mesh, i)).collect();
@@ -126,6 +131,7 @@ fn draw(pictures: &MeshPictures<'_>, title: &str, remark: &str, panels: Vec<Pane
         let along = pictures.surface.positions.iter().map(|p| axis.dot(p));
         along.clone().fold(f64::MIN, f64::max) - along.fold(f64::MAX, f64::min)
     };
+    // Long links have two panels in a row.
     let columns = if extent(flat.right) > LONG * extent(flat.up) { 2 } else { 3 };
     let rows = PANELS / columns;
     let (width, height) = (WIDTH / columns, (HEIGHT - HEAD) / rows);
@@ -144,12 +150,14 @@ fn draw(pictures: &MeshPictures<'_>, title: &str, remark: &str, panels: Vec<Pane
 
 impl Panel {
     fn draw(&self, pictures: &MeshPictures<'_>, toward: Vector3<f64>, [width, height]: [usize; 2]) -> Image {
+        // Deformed surface, with a peak of fixed size in the picture.
         let surface = &pictures.surface;
         let peak = pictures.peak(&self.field);
         let scale = if peak > 0.0 { SWING * surface.size / peak } else { 0.0 };
         let positions = surface.deformed(&self.field, scale);
         let values: Vec<f64> = surface.nodes.iter().map(|node| self.field[*node as usize].norm()).collect();
 
+        // Edges of the undeformed and the deformed body, and the load.
         let mut marks: Vec<Mark> = Vec::new();
         marks.extend(sheet::edges(&surface.positions, &surface.features, 0.9, color::FAINT, [0.45, 0.10]));
         marks.extend(sheet::edges(&positions, &surface.features, 1.1, EDGE, [0.60, 0.0]));
@@ -166,6 +174,7 @@ impl Panel {
         let scene = Scene { positions: &positions, triangles: &surface.triangles, paint, marks: &marks };
         let mut image = render(&scene, &view, width, height);
 
+        // Names of the interfaces, axes, texts and scale.
         for (number, interface) in pictures.interfaces.iter().enumerate() {
             let moved = match self.load {
                 Some(load) if number == 1 => load.u_B * scale,

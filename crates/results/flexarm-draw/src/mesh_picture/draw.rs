@@ -1,4 +1,7 @@
 //! Drawing on an image: lines, text, boxes. Edges are antialiased by pixel coverage.
+//!
+//! Start at [`Image::line`] and [`Image::text`]. Coordinates are pixels from the top left; the
+//! centre of the first pixel is at (0.5, 0.5). Not here: triangles in space ([`super::scene`]).
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, RasterizedChar, get_raster, get_raster_width};
 

@@ -1,4 +1,6 @@
 //! An image in memory, and its encoding as PNG.
+//!
+//! Start at [`Image::new`] and [`Image::to_png`]. Not here: lines and text ([`super::draw`]).
 
 /// Red, green, blue.
 pub use crate::palette::Rgb;

@@ -1,4 +1,7 @@
-//! The sheet of tied nodes and of the cut of the link.
+//! The sheet of tied nodes and of the cut of the link: three views and a legend.
+//!
+//! Start at [`draw`]. Frames: L link (all vectors in L, in m), A and B interfaces, S split.
+//! Not here: drawing of triangles ([`super::scene`]), the text of the legend ([`super::legend`]).
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
@@ -95,6 +98,7 @@ struct Content {
 
 impl Content {
     fn new(pictures: &MeshPictures<'_>, tied: &[Tied]) -> Self {
+        // Colours: the two parts of the link, and tied faces.
         let (surface, link) = (&pictures.surface, &pictures.reduction.link);
         let mut colors = vec![[color::PROXIMAL, color::DISTAL]; surface.triangles.len()];
         let mut bright = vec![false; surface.triangles.len()];
@@ -104,12 +108,14 @@ impl Content {
                 bright[triangle] = true;
             }
         }
+        // The cut is orthogonal to AB at the split.
         let p_LS = link.split.X_LS.translation.vector;
         let normal = link.p_AB().try_normalize(0.0).unwrap_or(pictures.axes.along);
         let side: Vec<f64> = surface.positions.iter().map(|p| normal.dot(&(p - p_LS))).collect();
         let section = section(&surface.positions, &surface.triangles, &side);
         let glass = glass(&section, &p_LS, &normal, &pictures.axes, surface.size);
 
+        // Edges of the body, cut plane with its section, ties.
         let mut marks = Vec::new();
         marks.extend(sheet::edges(&surface.positions, &surface.features, 1.0, color::INK, [0.75, 0.0]));
         marks.push(Mark::Polygon { corners: glass.clone(), color: color::CUT, alpha: [GLASS, 0.05] });
@@ -152,6 +158,7 @@ impl Content {
         let frame = [96.0, 30.0, width as f64 - 150.0, height as f64 - 48.0];
         let view = View::fit(*toward, axes.along, points, frame);
 
+        // Marks, those of this view first and last.
         let mut marks = self.grid(pictures, &view);
         marks.extend(self.marks.iter().cloned());
         marks.extend(self.dots(pictures, &view));
@@ -168,6 +175,7 @@ impl Content {
         let scene = Scene { positions: &surface.positions, triangles: &surface.triangles, paint, marks: &marks };
         let mut image = render(&scene, &view, width, height);
 
+        // Letters of the axes, names, compass and title over the picture.
         for (number, interface) in pictures.interfaces.iter().enumerate() {
             for (k, name) in ["x", "y", "z"].into_iter().enumerate() {
                 let tip = interface.X_LI * nalgebra::Point3::from(Vector3::ith(k, 1.22 * length));

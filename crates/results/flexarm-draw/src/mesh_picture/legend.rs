@@ -1,6 +1,9 @@
 //! The text next to the views: ties, position of the cut, masses of the parts.
+//!
+//! Start at [`draw`]. Not here: the views ([`super::interface_sheet`]), formats of numbers
+//! ([`super::numbers`]).
 
-use flexarm_fem::reduction::Tie;
+use flexarm_fem::reduction::{Interface, Tie};
 
 use super::MeshPictures;
 use super::color;
@@ -40,38 +43,49 @@ impl Column<'_> {
         }
         self.line(text, Style::new(18.0, color::INK).bold());
     }
-}
 
-/// Writes the legend on the right side of the sheet.
-pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]) {
-    let (plain, faint, alert) =
-        (Style::new(15.0, color::INK), Style::new(15.0, color::FAINT), Style::new(15.0, color::ALERT).bold());
-    let mut column = Column { sheet, left: (WIDTH - LEGEND) as f64 + 46.0, y: HEAD as f64 + 20.0 };
-    for (number, (interface, tied)) in pictures.interfaces.iter().zip(tied).enumerate() {
-        let role = ["held in the pictures", "loaded in the pictures", "a further interface"][number.min(2)];
-        column.heading(&format!("{}: {role}", interface.name), color::interface(number));
+    /// Writes tie, faces and origin of an interface, and what is wrong with it.
+    fn interface(&mut self, interface: &Interface, tied: &Tied, has_solids: bool) {
+        let (plain, faint, alert) = styles();
         let tie = match interface.tie {
             Tie::Rigid => "rigid tie (RBE2)",
             Tie::Distributing => "distributing tie (RBE3)",
         };
-        column.line(&format!("{tie}, {} node(s)", interface.nodes.len()), plain);
+        self.line(&format!("{tie}, {} node(s)", interface.nodes.len()), plain);
         if tied.faces > 0 {
-            column.line(&format!("{} faces, {}, {}", tied.faces, numbers::area(tied.area), shape(tied)), plain);
+            self.line(&format!("{} faces, {}, {}", tied.faces, numbers::area(tied.area), shape(tied)), plain);
         }
         let of = if tied.faces > 0 { "faces" } else { "nodes" };
         let origin = interface.X_LI.translation.vector;
-        column.line(&format!("origin {}", numbers::position(&origin)), faint);
-        column.line(&format!("{} from the centre of the {of}", numbers::offset((tied.centre - origin).norm())), faint);
-        let has_solids = !pictures.surface.features.is_empty() || !pictures.surface.grid.is_empty();
+        self.line(&format!("origin {}", numbers::position(&origin)), faint);
+        self.line(&format!("{} from the centre of the {of}", numbers::offset((tied.centre - origin).norm())), faint);
         if tied.faces == 0 && has_solids {
-            column.line("No face of the skin is tied as a whole, only single nodes.", alert);
+            self.line("No face of the skin is tied as a whole, only single nodes.", alert);
         }
         if tied.torn > 0 {
             let count = tied.torn;
-            column.line(&format!("{count} faces are tied by their corners only, mid-side nodes are loose."), alert);
+            self.line(&format!("{count} faces are tied by their corners only, mid-side nodes are loose."), alert);
         }
     }
+}
 
+/// Styles of plain, secondary and alerting lines.
+fn styles() -> (Style, Style, Style) {
+    (Style::new(15.0, color::INK), Style::new(15.0, color::FAINT), Style::new(15.0, color::ALERT).bold())
+}
+
+/// Writes the legend on the right side of the sheet.
+pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]) {
+    let mut column = Column { sheet, left: (WIDTH - LEGEND) as f64 + 46.0, y: HEAD as f64 + 20.0 };
+    for (number, (interface, tied)) in pictures.interfaces.iter().zip(tied).enumerate() {
+        let role = ["held in the pictures", "loaded in the pictures", "a further interface"][number.min(2)];
+        column.heading(&format!("{}: {role}", interface.name), color::interface(number));
+        let has_solids = !pictures.surface.features.is_empty() || !pictures.surface.grid.is_empty();
+        column.interface(interface, tied, has_solids);
+    }
+
+    let (plain, faint, alert) = styles();
+    // The cut, as a share of the way from A to B.
     let (reduction, link) = (pictures.reduction, &pictures.reduction.link);
     let p_LS = link.split.X_LS.translation.vector;
     let along = link.p_AB();
@@ -80,6 +94,7 @@ pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]
     column.line(&format!("at {}", numbers::position(&p_LS)), plain);
     column.line(&format!("{:.0} % of the way from A to B, across AB", 100.0 * fraction), plain);
 
+    // Masses of the parts and of the mesh, and what rides on the link.
     let kilograms = |mass: f64| format!("{} kg", numbers::significant(mass, 4));
     column.heading(&format!("part of A: {}", kilograms(link.proximal.mass)), color::PROXIMAL);
     column.heading(&format!("part of B: {}", kilograms(link.distal.mass)), color::DISTAL);
@@ -88,6 +103,7 @@ pub(super) fn draw(sheet: &mut Image, pictures: &MeshPictures<'_>, tied: &[Tied]
     if riding > 1e-6 * link.mass() {
         column.line(&format!("riding on it {}", kilograms(riding)), plain);
     }
+    // Size of the mesh, and warnings.
     column.y += 9.0;
     column.line(&format!("A to B {} mm", numbers::significant(along.norm() * 1e3, 4)), faint);
     let mesh = pictures.mesh;

@@ -6,13 +6,14 @@
 //! modes.png        the first six modes with A held, with the frequencies of the reduced models
 //! ```
 //! A reduction can have consistent numbers and still use the wrong faces; a picture shows that at a
-//! glance. Start at [`write_pictures`]; [`MeshPictures`] gives the same as images in memory.
+//! glance. Start at [`MeshPictures`], which draws each sheet as an image in memory.
 //!
 //! Layers: [`scene`] draws triangles and has no concept of finite elements, the sheets convert a
 //! mesh and its reduction into scenes. The same input gives the same bytes. No graphics card is
 //! needed.
 //!
-//! Not here: the reduction itself ([`flexarm_fem::mesh_link`]), recordings of runs.
+//! Not here: the reduction itself ([`flexarm_fem::mesh_link`]), writing of files, recordings of
+//! runs.
 
 pub mod color;
 mod deflection_sheet;
@@ -26,10 +27,8 @@ pub mod scene;
 mod sheet;
 pub(crate) mod stress_sheet;
 mod surface;
-mod topology;
+pub(crate) mod topology;
 pub(crate) mod view;
-
-use std::path::{Path, PathBuf};
 
 use nalgebra::{DMatrix, Vector3};
 
@@ -72,25 +71,6 @@ pub enum PictureError {
         /// Index of the node.
         node: usize,
     },
-    /// The image does not fit into its file format.
-    #[error("{}: cannot make a PNG: {cause}", path.display())]
-    Encode {
-        /// The file.
-        path: PathBuf,
-        /// Error of the encoder.
-        cause: PngError,
-    },
-    /// An error of the operating system.
-    #[error("{}: cannot {action}", path.display())]
-    Io {
-        /// The file or folder.
-        path: PathBuf,
-        /// Attempted action.
-        action: &'static str,
-        /// Cause.
-        #[source]
-        source: std::io::Error,
-    },
 }
 
 /// A mesh and its reduction, ready to be drawn.
@@ -116,6 +96,7 @@ impl<'a> MeshPictures<'a> {
         interfaces: &'a [Interface],
         reduction: &'a MeshReduction,
     ) -> Result<Self, PictureError> {
+        // Sizes of displacements and modes, and nodes of the interfaces.
         let dofs = DofMap::new(mesh);
         let fits = |what: &str, found: usize, expected: usize, fine: bool| {
             if fine { Ok(()) } else { Err(PictureError::Mismatch { what: what.to_owned(), found, expected }) }
@@ -135,6 +116,7 @@ impl<'a> MeshPictures<'a> {
             let what = format!("nodes that interface {:?} counts", interface.name);
             fits(&what, last + 1, mesh.nodes.len(), last < mesh.nodes.len())?;
         }
+        // Finite positions and displacements.
         let finite = |p: &Vector3<f64>| p.iter().all(|x| x.is_finite());
         if let Some(node) = mesh.nodes.iter().position(|p| !finite(p)) {
             return Err(PictureError::NotFinite { what: "the position", node });
@@ -183,44 +165,4 @@ impl<'a> MeshPictures<'a> {
     fn peak(&self, field: &[Vector3<f64>]) -> f64 {
         self.surface.nodes.iter().map(|node| field[*node as usize].norm()).fold(0.0, f64::max)
     }
-}
-
-/// Draws a reduction into `dir`: `interfaces.png`, `unit_loads.png`, and `modes.png` if there are
-/// modes.
-///
-/// Creates the folder; existing files of these names are replaced. Takes well under a second per
-/// sheet for a skin of twenty thousand faces, in an optimised build.
-///
-/// * `interfaces`: those of the reduction, proximal first.
-///
-/// Returns the files written.
-///
-/// # Errors
-/// [`PictureError`]; sheets written before the failure are kept.
-pub fn write_pictures(
-    dir: &Path,
-    mesh: &Mesh,
-    interfaces: &[Interface],
-    reduction: &MeshReduction,
-) -> Result<Vec<PathBuf>, PictureError> {
-    let pictures = MeshPictures::new(mesh, interfaces, reduction)?;
-    let io = |path: &Path, action: &'static str| {
-        let path = path.to_owned();
-        move |source| PictureError::Io { path, action, source }
-    };
-    std::fs::create_dir_all(dir).map_err(io(dir, "make the folder"))?;
-    let mut written = Vec::new();
-    let mut write = |name: &str, image: Image| {
-        let path = dir.join(name);
-        let bytes = image.to_png().map_err(|cause| PictureError::Encode { path: path.clone(), cause })?;
-        std::fs::write(&path, bytes).map_err(io(&path, "write the picture"))?;
-        written.push(path);
-        Ok::<_, PictureError>(())
-    };
-    write("interfaces.png", pictures.render_interfaces())?;
-    write("unit_loads.png", pictures.render_unit_loads())?;
-    if !reduction.held_modes.is_empty() {
-        write("modes.png", pictures.render_modes()?)?;
-    }
-    Ok(written)
 }

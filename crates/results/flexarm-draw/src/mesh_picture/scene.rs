@@ -94,7 +94,11 @@ pub struct Scene<'a> {
     pub marks: &'a [Mark],
 }
 
-/// Draws a scene.
+/// Draws a scene on paper, `width` times `height` pixels. The cost grows with the covered samples,
+/// four per pixel, and with the triangles.
+///
+/// # Panics
+/// If a triangle has an index beyond the positions, or the paint has too few numbers.
 pub fn render(scene: &Scene<'_>, view: &View, width: usize, height: usize) -> Image {
     let mut canvas = Canvas::new(scene, view, [width, height]);
     for mark in scene.marks {

@@ -1,4 +1,7 @@
 //! The sheet of a link's stress: both sides, coloured by the von Mises stress.
+//!
+//! Start at [`stress_sheet`]. Vectors in link axes, in m; stress in Pa, written in MPa.
+//! Not here: the stress itself (`flexarm_fem`), drawing of triangles ([`super::scene`]).
 
 use nalgebra::Vector3;
 
@@ -29,13 +32,17 @@ pub struct StressPicture<'a> {
     pub triangles: &'a [[u32; 3]],
     /// Von Mises stress of each node, Pa.
     pub stress: &'a [f64],
-    /// Worst nodes, with numbers in the picture; the stress of the first one is the end of the scale.
+    /// Worst nodes, with numbers in the picture; the stress of the first one is the end of the
+    /// scale.
     pub worst: &'a [usize],
     /// From interface A to B.
     pub along: Vector3<f64>,
 }
 
 /// Draws the side on which the worst node is, and the opposite one.
+///
+/// # Panics
+/// If a triangle or a worst node has an index beyond the positions or stresses.
 pub fn stress_sheet(picture: &StressPicture<'_>) -> Image {
     let title = format!("{}: largest von Mises stress of the run", picture.link);
     let mut sheet = sheet::sheet(&title, picture.remark);
@@ -86,6 +93,7 @@ fn panel(
     toward: Vector3<f64>,
     [width, height]: [usize; 2],
 ) -> Image {
+    // The surface with its edges and a dot at each of the worst places.
     let peak = picture.worst.first().map_or(0.0, |node| picture.stress[*node]);
     let mut marks: Vec<Mark> = sheet::edges(picture.positions, edges, 1.0, color::FAINT, [0.5, 0.0]).collect();
     let dots = visible.iter().map(|(_, node)| Mark::Dot {
@@ -100,6 +108,7 @@ fn panel(
     let paint = Paint::Magnitude { values: picture.stress, peak: if peak > 0.0 { peak } else { 1.0 } };
     let scene = Scene { positions: picture.positions, triangles: picture.triangles, paint, marks: &marks };
     let mut image = render(&scene, &view, width, height);
+    // Numbers, axes, scale and note over the picture.
     for (number, node) in visible {
         let text = format!("{} {} MPa", number + 1, numbers::significant(1e-6 * picture.stress[*node], 3));
         sheet::label(&mut image, &view, &picture.positions[*node], &text, 15.0, color::INK);

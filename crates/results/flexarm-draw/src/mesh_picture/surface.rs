@@ -1,4 +1,7 @@
 //! The drawable surface of a mesh, and the faces that an interface ties.
+//!
+//! Start at [`Surface::new`] and [`Surface::tied`]. Positions in link axes, in m; a vertex of the
+//! surface is a node of the mesh. Not here: drawing ([`super::scene`]), the skin (`flexarm_fem`).
 
 use nalgebra::Vector3;
 
@@ -6,7 +9,7 @@ use flexarm_fem::Mesh;
 use flexarm_fem::mesh::skin;
 use flexarm_fem::reduction::Interface;
 
-use super::topology::{feature_edges, triangle_normals};
+use super::topology::{feature_edges, prism, triangle_normals};
 
 /// Radius of the rods drawn for beam elements, as a share of the size of the mesh.
 const ROD: f64 = 0.008;
@@ -98,27 +101,12 @@ impl Surface {
 
     /// Adds a prism around a beam element; its ends move with the nodes.
     fn rod(&mut self, mesh: &Mesh, from: u32, to: u32) {
-        let [a, b] = [from, to].map(|node| mesh.nodes[node as usize]);
-        let Some(along) = (b - a).try_normalize(0.0) else { return };
-        let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
-        let z = along.cross(&y);
+        let ends = [from, to].map(|node| &mesh.nodes[node as usize]);
+        let Some((positions, triangles)) = prism(ends, ROD * self.size, ROD_SIDES, 0.0) else { return };
         let first = self.positions.len() as u32;
-        for (node, centre) in [(from, a), (to, b)] {
-            for k in 0..ROD_SIDES {
-                let (sin, cos) = (f64::from(k) / f64::from(ROD_SIDES) * std::f64::consts::TAU).sin_cos();
-                self.positions.push(centre + (y * cos + z * sin) * ROD * self.size);
-                self.nodes.push(node);
-            }
-        }
-        let n = ROD_SIDES;
-        for k in 0..n {
-            let next = (k + 1) % n;
-            let [p, q, r, s] = [k, next, n + next, n + k].map(|v| first + v);
-            self.triangles.extend([[p, q, r], [p, r, s]]);
-        }
-        for k in 2..n {
-            self.triangles.extend([[0, k, k - 1], [n, n + k - 1, n + k]].map(|t| t.map(|v| first + v)));
-        }
+        self.positions.extend(positions);
+        self.nodes.extend([from, to].into_iter().flat_map(|node| std::iter::repeat_n(node, ROD_SIDES as usize)));
+        self.triangles.extend(triangles.into_iter().map(|t| t.map(|v| first + v)));
     }
 
     /// Returns the positions displaced by `scale` times a field of the mesh.
@@ -128,6 +116,7 @@ impl Surface {
 
     /// Returns the faces that `interface` ties.
     pub(super) fn tied(&self, mesh: &Mesh, interface: &Interface) -> Tied {
+        // Faces with all their nodes tied.
         let mut is_tied = vec![false; mesh.nodes.len()];
         for node in &interface.nodes {
             is_tied[*node as usize] = true;
@@ -138,6 +127,7 @@ impl Surface {
         let mut triangles: Vec<bool> = self.face_of.iter().map(|face| faces[*face as usize]).collect();
         triangles.resize(self.triangles.len(), false);
 
+        // Their area, mean normal and centre.
         let (mut area, mut normal, mut centre) = (0.0, Vector3::zeros(), Vector3::zeros());
         let normals = triangle_normals(&self.positions, &self.triangles);
         for (number, (n, a)) in normals.iter().enumerate().filter(|(number, _)| triangles[*number]) {

@@ -1,9 +1,31 @@
-//! Shading data of triangles: smooth normals on curved faces, lines at edges.
+//! Triangles without finite elements: prisms, smooth normals on curved faces, lines at edges.
 
 use nalgebra::Vector3;
 
 /// Angle below which adjacent faces are drawn as one smooth surface, degrees.
 const SMOOTH_DEG: f64 = 32.0;
+
+/// Positions of corners, and triangles of their numbers with outward normals.
+type Triangles = (Vec<Vector3<f64>>, Vec<[u32; 3]>);
+
+/// Corners and triangles of a prism around the line between two points, first the corners around
+/// `from`, then those around `to`; `None` if the points are closer than `least` (m).
+pub fn prism([from, to]: [&Vector3<f64>; 2], radius: f64, sides: u32, least: f64) -> Option<Triangles> {
+    let along = (to - from).try_normalize(least)?;
+    let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
+    let z = along.cross(&y);
+    let corner = |end: &Vector3<f64>, k: u32| {
+        let (sin, cos) = (f64::from(k) / f64::from(sides) * std::f64::consts::TAU).sin_cos();
+        end + (y * cos + z * sin) * radius
+    };
+    let positions = [from, to].into_iter().flat_map(|end| (0..sides).map(move |k| corner(end, k))).collect();
+    let walls = (0..sides).flat_map(|k| {
+        let next = (k + 1) % sides;
+        [[k, next, sides + next], [k, sides + next, sides + k]]
+    });
+    let caps = (2..sides).flat_map(|k| [[0, k, k - 1], [sides, sides + k - 1, sides + k]]);
+    Some((positions, walls.chain(caps).collect()))
+}
 
 /// Unit outward normal and area of each triangle; zero normal for a triangle without area.
 pub(super) fn triangle_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<(Vector3<f64>, f64)> {
@@ -19,6 +41,7 @@ pub(super) fn triangle_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]
 /// Normals at the corners of triangles: mean over the surrounding triangles of the same smooth
 /// surface.
 pub(super) fn corner_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]]) -> Vec<[Vector3<f64>; 3]> {
+    // Triangles around each vertex: lists in one array, with their starts.
     let normals = triangle_normals(positions, triangles);
     let mut starts = vec![0_u32; positions.len() + 1];
     for vertex in triangles.as_flattened() {
@@ -36,6 +59,7 @@ pub(super) fn corner_normals(positions: &[Vector3<f64>], triangles: &[[u32; 3]])
             *slot += 1;
         }
     }
+    // Mean of those that are part of the same smooth surface, weighted by area.
     let same_wall = SMOOTH_DEG.to_radians().cos();
     let corner = |vertex: u32, own: Vector3<f64>| {
         let range = starts[vertex as usize] as usize..starts[vertex as usize + 1] as usize;

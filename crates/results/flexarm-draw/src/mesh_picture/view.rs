@@ -1,4 +1,7 @@
 //! Viewing direction of a link, and projection of its points onto the picture.
+//!
+//! Start at [`View::fit`]. Vectors in the axes of the scene (link or world), in m; positions on the
+//! picture in pixels from the top left. Not here: visibility ([`super::scene`]).
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
@@ -70,6 +73,7 @@ impl LinkAxes {
     /// Uses the axes of the link if it is aligned with one of them to 20 degrees, else its
     /// principal axes.
     pub fn new(points: &[Vector3<f64>], p_AB: &Vector3<f64>) -> Self {
+        // Principal axes of the points.
         let centre = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         let spread = points.iter().fold(Matrix3::zeros(), |sum, p| sum + (p - centre) * (p - centre).transpose());
         let eigen = SymmetricEigen::new(spread);
@@ -77,6 +81,7 @@ impl LinkAxes {
         let principal = eigen.eigenvectors.column(longest).into_owned();
         let axes = if principal.amax() > 20_f64.to_radians().cos() { Matrix3::identity() } else { eigen.eigenvectors };
 
+        // The longest extent is along the link, towards B; the next one across it.
         let mut axes: Vec<(f64, Vector3<f64>)> = (0..3)
             .map(|k| {
                 let axis = axes.column(k).into_owned();

@@ -1,4 +1,7 @@
 //! One panel: axes, bands, marks and curves.
+//!
+//! Start at [`Frame::draw`]; what is drawn first lies below.
+//! Not here: ranges of the axes ([`super::ranges`]), names of the curves ([`super::legend`]).
 
 use std::ops::Range;
 
@@ -28,6 +31,7 @@ pub(super) struct Frame<'a> {
 }
 
 impl Frame<'_> {
+    /// Draws the panel; `x` and `y` are the ranges of [`Frame::ranges`], linear or logarithmic.
     pub(super) fn draw<X, Y>(&self, area: &Area<'_>, x: X, y: Y) -> Result<(), PlotError>
     where
         X: AsRangedCoord<Value = f64>,
@@ -35,6 +39,7 @@ impl Frame<'_> {
         X::CoordDescType: ValueFormatter<f64> + Ranged<ValueType = f64>,
         Y::CoordDescType: ValueFormatter<f64> + Ranged<ValueType = f64>,
     {
+        // The area of the chart, with space for numbers.
         let style = self.style;
         let mut chart = ChartBuilder::on(area);
         chart
@@ -43,6 +48,7 @@ impl Frame<'_> {
             .x_label_area_size(style.x_area)
             .y_label_area_size(style.y_area);
         let mut chart = chart.build_cartesian_2d(x, y)?;
+        // Bands, then grid and axes over them.
         let (across, up) = &self.ranges;
         let bands = self.bands.iter().filter(|(from, to)| *to > across.start && *from < across.end);
         let corners = |(from, to): &(f64, f64)| [(from.max(across.start), up.start), (to.min(across.end), up.end)];
@@ -58,6 +64,7 @@ impl Frame<'_> {
             .x_label_formatter(&|x| plain(*x))
             .y_label_formatter(&|y| plain(*y))
             .draw()?;
+        // Marks, then curves with their dots.
         self.draw_marks(&mut chart)?;
         for (curve, points) in self.panel.curves.iter().zip(self.points) {
             let shape = style_of(curve, self.all, style);

@@ -78,7 +78,9 @@ pub fn plan_plot(x_label: &str, panel: &Panel) -> Result<String, PlotError> {
     plot(&LinePlot { x_label, panels: std::slice::from_ref(panel), ..LinePlot::default() }, &[], &PLAN)
 }
 
+/// Draws a plot in a style, with intervals `bands` of the horizontal axis tinted.
 fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<String, PlotError> {
+    // Curves in the order of their colours; the same name in two panels is one curve.
     let panels = what.panels;
     let mut curves: Vec<&PlotCurve> = Vec::new();
     for curve in panels.iter().flat_map(|panel| &panel.curves) {
@@ -87,6 +89,7 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
         }
     }
     let legend = if panels.iter().any(|p| p.legend) { legend_rows(&curves, style) } else { Vec::new() };
+    // Heading and legend above the panels.
     let row = style.legend_font * 3 / 2;
     let above_legend = heading_height(what, style);
     let above = above_legend + if legend.is_empty() { 0 } else { row * legend.len() as u32 + style.margin };
@@ -96,11 +99,12 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
         let (heading, strip) = strip.split_vertically(above_legend);
         draw_heading(&heading, what, style)?;
         draw_legend(&strip, &legend, &curves, style)?;
+        // Panels, the horizontal axis labelled in the last one.
         for (k, (panel, part)) in panels.iter().zip(area.split_evenly((panels.len(), 1))).enumerate() {
             let x_label = if k + 1 == panels.len() { what.x_label } else { "" };
             let points = points(panel);
             let ranges = ranges(&points, panel.logarithmic)
-                .ok_or_else(|| PlotError(format!("{:?} has nothing finite to draw", panel.label)))?;
+                .ok_or_else(|| PlotError::NothingFinite { panel: panel.label.clone() })?;
             let ranges = if style.equal { equally_long(ranges, style) } else { ranges };
             let (x, y) = ranges.clone();
             let (marks, named) = (what.marks, k == 0);
@@ -114,6 +118,7 @@ fn plot(what: &LinePlot<'_>, bands: &[(f64, f64)], style: &Style) -> Result<Stri
         }
         Ok(())
     })?;
+    // Size on paper instead of pixels.
     if let Some(mm) = style.width_mm {
         let high = mm * f64::from(height) / f64::from(width);
         let (old, new) =

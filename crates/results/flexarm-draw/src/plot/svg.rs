@@ -1,4 +1,7 @@
 //! Pictures as SVG: areas, axes, and numbers on them.
+//!
+//! Start at [`picture`] and [`axes`]. Sizes are pixels of the picture.
+//! Not here: curves with a legend ([`super::frame`]), charts of studies ([`crate::charts`]).
 
 use std::ops::Range;
 
@@ -14,12 +17,25 @@ pub(crate) const MARK: RGBColor = RGBColor(140, 146, 156);
 
 /// Reason why there is no picture.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no plot: {0}")]
-pub struct PlotError(pub(super) String);
+#[non_exhaustive]
+pub enum PlotError {
+    /// No point of a panel is finite, or positive on a logarithmic axis.
+    #[error("no plot: {panel:?} has nothing finite to draw")]
+    NothingFinite {
+        /// Label of its vertical axis.
+        panel: String,
+    },
+    /// The drawing library refuses an element.
+    #[error("no plot: {cause}")]
+    Drawing {
+        /// Message of the library.
+        cause: String,
+    },
+}
 
 impl<E: std::error::Error + Send + Sync> From<DrawingAreaErrorKind<E>> for PlotError {
     fn from(error: DrawingAreaErrorKind<E>) -> Self {
-        Self(error.to_string())
+        Self::Drawing { cause: error.to_string() }
     }
 }
 
