@@ -158,8 +158,7 @@ pub fn reduce_mesh(
     let unit_loads = condensation.unit_load_shapes().columns(0, 6).into_owned();
 
     step(ReductionStep::Modes);
-    let fixed_modes = condensation.fixed_modes(plan.modes)?;
-    let held_modes = condensation.held_modes(ModesWanted::Count(plan.judged_modes))?;
+    let (fixed_modes, held_modes) = condensation.fixed_and_held_modes(plan.modes, plan.judged_modes)?;
     let frame = |i: &Interface| InterfaceFrame { name: i.name.clone(), X_LI: i.X_LI, tie: Some(i.tie) };
     let superelement = condensation.superelement(plan.interfaces.iter().map(frame).collect(), &fixed_modes);
 

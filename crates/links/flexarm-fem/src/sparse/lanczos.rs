@@ -11,17 +11,23 @@
 //! factor serves the whole block. The operator is given as two closures, so that the caller handles
 //! constraints.
 //!
+//! Modes of the same body with one support released come from the same basis
+//! ([`modes_of_two_supports`]), without further solves.
+//!
 //! Source: Grimes, Lewis & Simon (1994), A shifted block Lanczos algorithm, sections 2 and 4, with
 //! full reorthogonalisation in place of their selective one.
 
 mod basis;
+mod released;
 
 use nalgebra::DMatrix;
 
 use self::basis::Basis;
 use super::block::Block;
+use super::dense::symmetric_eigen;
 
 pub(crate) use basis::orthonormalising;
+pub(crate) use released::Released;
 
 /// Residual `‖K⁻¹ M φ - θ φ‖_M / θ` below which a mode is converged.
 const TOLERANCE: f64 = 1e-10;
@@ -61,7 +67,7 @@ pub struct Modes {
     pub shapes: DMatrix<f64>,
     /// `‖K⁻¹ M φ - θ φ‖_M / θ` of each mode, from the recurrence.
     pub residuals: Vec<f64>,
-    /// Number of right-hand sides solved.
+    /// Number of right-hand sides solved; zero if another basis was reused.
     pub solves: usize,
 }
 
@@ -118,8 +124,7 @@ pub enum ModesError {
 
 /// Computes the lowest modes of a pencil.
 ///
-/// Returns fewer modes than requested only if the space has no more. Cost: one solve of each vector
-/// of the basis, which has at most `8 count + 120` vectors; usually four to eight per mode.
+/// Returns fewer modes than requested only if the space has no more.
 ///
 /// # Errors
 /// [`ModesError`].
@@ -128,21 +133,64 @@ pub(crate) fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Re
     if count == 0 {
         return Ok(Modes::none(pencil.rows));
     }
-    let mut basis = Basis::start(pencil)?;
+    let mut basis = Basis::start(pencil, None)?;
     let limit = pencil.dimension.min(8 * count + 120);
+    let (ritz, found) = loop {
+        basis.advance(pencil, None)?;
+        if basis.is_to_be_looked_at(count, limit) {
+            let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;
+            match ritz.settled(wanted, count, &basis)? {
+                Some(found) => break (ritz, found),
+                None => basis.refuse_if_full(&ritz, count, limit)?,
+            }
+        }
+    };
+    let [modes] = basis.into_modes([(&ritz, found)], None);
+    Ok(modes)
+}
+
+/// Computes the lowest modes of a pencil, and `released_count` modes with one support released,
+/// from one basis.
+///
+/// ```text
+/// K_r⁻¹ = K⁻¹ + T C Tᵀ                                T: static shapes of the released support, C = (Tᵀ K T)⁻¹
+/// K_r⁻¹ M [V T] = [V T] P + V_{j+1} R_{j+1} s_last    where V begins with K⁻¹ M T
+/// ```
+/// The basis of the first pencil, extended by T, is a Lanczos basis of the second.
+///
+/// # Errors
+/// [`ModesError`].
+pub(crate) fn modes_of_two_supports(
+    pencil: &mut Pencil<'_>,
+    wanted: ModesWanted,
+    released: &Released<'_>,
+    released_count: usize,
+) -> Result<(Modes, Modes), ModesError> {
+    let (rows, dimension) = (pencil.rows, pencil.dimension);
+    let count = wanted.count(dimension);
+    let others = ModesWanted::Count(released_count.min(dimension + released.T.width));
+    let most = count.max(released_count);
+    if most == 0 {
+        return Ok((Modes::none(rows), Modes::none(rows)));
+    }
+    let mut basis = Basis::start(pencil, Some(released))?;
+    let limit = dimension.min(8 * most + 120);
     loop {
-        basis.advance(pencil)?;
-        if !basis.is_check_due(count, limit) {
+        basis.advance(pencil, Some(released.T))?;
+        if !basis.is_to_be_looked_at(most, limit) {
             continue;
         }
         let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;
-        if let Some(found) = ritz.settled(wanted, count, basis.is_exhausted())? {
-            return Ok(basis.into_modes(&ritz, found));
-        }
-        if basis.is_full(limit) {
-            let residual = ritz.residuals.iter().take(count).copied().fold(0.0, f64::max);
-            let (found, basis) = (ritz.converged(), basis.len());
-            return Err(ModesError::NotConverged { found, wanted: count, basis, residual });
+        // Both sets of modes from the same basis; each must have settled.
+        let found = if count == 0 { Some(0) } else { ritz.settled(wanted, count, &basis)? };
+        let other = basis.released_ritz(released).ok_or(ModesError::NotFinite)?;
+        match (found, other.settled(others, others.count(usize::MAX), &basis)?) {
+            (Some(found), Some(other_found)) => {
+                let [modes, other] = basis.into_modes([(&ritz, found), (&other, other_found)], Some(released.T));
+                return Ok((modes, Modes { solves: 0, ..other }));
+            }
+            (None, _) => basis.refuse_if_full(&ritz, count, limit)?,
+            (_, None) => basis.refuse_if_full(&other, released_count, limit)?,
         }
     }
 }
@@ -162,16 +210,26 @@ struct Ritz {
     theta: Vec<f64>,
     /// Eigenvectors over the basis.
     vectors: DMatrix<f64>,
+    /// Components over the shapes of a released support; no rows if there is none.
+    beside: DMatrix<f64>,
     residuals: Vec<f64>,
 }
 
 impl Ritz {
+    /// Positive eigenvalues of `H` and their eigenvectors; `None` if not finite.
+    fn of(H: &DMatrix<f64>) -> Option<(Vec<f64>, DMatrix<f64>)> {
+        let (eigenvalues, eigenvectors) = symmetric_eigen(H)?;
+        let positive: Vec<usize> = (0..eigenvalues.len()).rev().filter(|k| eigenvalues[*k] > 0.0).collect();
+        Some((positive.iter().map(|k| eigenvalues[*k]).collect(), eigenvectors.select_columns(&positive)))
+    }
+
     fn converged(&self) -> usize {
         self.residuals.iter().take_while(|r| **r <= TOLERANCE).count()
     }
 
-    /// Number of modes to return, once it is certain.
-    fn settled(&self, wanted: ModesWanted, count: usize, exhausted: bool) -> Result<Option<usize>, ModesError> {
+    /// Returns the number of modes to return, once it is certain.
+    fn settled(&self, wanted: ModesWanted, count: usize, basis: &Basis) -> Result<Option<usize>, ModesError> {
+        let exhausted = basis.is_exhausted();
         let good = if exhausted { self.theta.len() } else { self.converged() };
         match wanted {
             ModesWanted::Count(_) => Ok((good >= count || exhausted).then_some(good.min(count))),

@@ -31,5 +31,5 @@ pub use symmetric::{Pattern, SparseSymmetric};
 pub(crate) use block::{Block, Row, WIDTH, grams, subtract_products};
 pub(crate) use cholesky::{Cholesky, NotPositiveDefinite};
 pub(crate) use dense::{add_product, gram};
-pub(crate) use lanczos::{Pencil, orthonormalising, smallest_modes};
+pub(crate) use lanczos::{Pencil, Released, modes_of_two_supports, orthonormalising, smallest_modes};
 pub(crate) use vectors::{Wide, Work, quickly};

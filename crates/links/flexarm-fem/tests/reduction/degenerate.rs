@@ -48,8 +48,7 @@ fn more_modes_than_there_are_unknowns_are_all_modes_that_there_are() {
     let inner: Vec<usize> =
         (0..model.size()).filter(|dof| model.nodes[dof / 3].x > 0.1 && model.nodes[dof / 3].x < 0.3).collect();
     let truth = dense_omega2(&model, &inner);
-    let fixed = reduction.fixed_modes(ModesWanted::Count(100)).unwrap();
-    let held = reduction.held_modes(ModesWanted::Count(100)).unwrap();
+    let (fixed, held) = reduction.fixed_and_held_modes(ModesWanted::Count(100), 100).unwrap();
     check_modes(&reduction, &fixed, 12);
     assert_eq!(held.len(), 18);
     for (found, truth) in fixed.omega2.iter().zip(&truth) {
@@ -68,8 +67,7 @@ fn a_cube_all_of_whose_nodes_are_in_interfaces_has_the_modes_that_its_ties_leave
     for (tie, count) in [([Tie::Rigid, Tie::Distributing], 6), ([Tie::Distributing; 2], 12)] {
         let (model, ends) = bar_between([1, 1, 1], tie);
         let reduction = Condensation::new(&model, &ends, CondensationOptions::default()).unwrap();
-        let fixed = reduction.fixed_modes(ModesWanted::Count(50)).unwrap();
-        let held = reduction.held_modes(ModesWanted::Count(50)).unwrap();
+        let (fixed, held) = reduction.fixed_and_held_modes(ModesWanted::Count(50), 50).unwrap();
         check_modes(&reduction, &fixed, count);
         assert_eq!(held.len(), count + 6);
         assert!(reduction.condition_estimate() > 1.0);
@@ -139,8 +137,7 @@ fn a_beam_of_one_element_has_no_fixed_modes_and_six_with_one_end_held() {
     let model = FeModel::assemble(&mesh, &AssemblyOptions::default()).unwrap();
     let boundary = Boundary::retained(12, &(0..12).collect::<Vec<u32>>());
     let reduction = Condensation::with_boundary(&model, boundary, CondensationOptions::default()).unwrap();
-    let fixed = reduction.fixed_modes(ModesWanted::Count(4)).unwrap();
-    let held = reduction.held_modes(ModesWanted::Count(10)).unwrap();
+    let (fixed, held) = reduction.fixed_and_held_modes(ModesWanted::Count(4), 10).unwrap();
     assert_eq!((fixed.len(), held.len()), (0, 6));
     for (found, truth) in held.omega2.iter().zip(dense_omega2(&model, &[6, 7, 8, 9, 10, 11])) {
         assert!((found / truth - 1.0).abs() < 1e-9, "{found} {truth}"); // measured 6e-15

@@ -5,14 +5,12 @@ use nalgebra::Vector3;
 /// Angle below which adjacent faces are drawn as one smooth surface, degrees.
 const SMOOTH_DEG: f64 = 32.0;
 
+/// Positions of corners, and triangles of their numbers with outward normals.
+type Triangles = (Vec<Vector3<f64>>, Vec<[u32; 3]>);
+
 /// Corners and triangles of a prism around the line between two points, first the corners around
 /// `from`, then those around `to`; `None` if the points are closer than `least` (m).
-pub fn prism(
-    [from, to]: [&Vector3<f64>; 2],
-    radius: f64,
-    sides: u32,
-    least: f64,
-) -> Option<(Vec<Vector3<f64>>, Vec<[u32; 3]>)> {
+pub fn prism([from, to]: [&Vector3<f64>; 2], radius: f64, sides: u32, least: f64) -> Option<Triangles> {
     let along = (to - from).try_normalize(least)?;
     let y = along.cross(&Vector3::ith(along.iamin(), 1.0)).normalize();
     let z = along.cross(&y);

@@ -5,7 +5,10 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::Condensation;
-use crate::sparse::{Block, Modes, ModesError, ModesWanted, Pencil, WIDTH, add_product, gram, smallest_modes};
+use crate::sparse::{
+    Block, Modes, ModesError, ModesWanted, Pencil, Released, WIDTH, add_product, gram, modes_of_two_supports,
+    smallest_modes,
+};
 
 /// Residual of a mode above which it is refined by one more solve.
 const ROUGH: f64 = 1e-6;
@@ -19,7 +22,8 @@ impl Condensation<'_> {
         let solve = &mut |F: &mut Block| {
             self.solve_constrained(F, None);
         };
-        self.lowest_modes(self.dimension(), solve, wanted)
+        let mass = &mut self.mass_product();
+        smallest_modes(&mut self.pencil(0, solve, mass), wanted)
     }
 
     /// Modes with the first interface clamped and the others free.
@@ -27,29 +31,43 @@ impl Condensation<'_> {
     /// # Errors
     /// [`ModesError`].
     pub fn held_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        let dimension = self.dimension() + self.boundary.columns() - 6;
-        self.lowest_modes(dimension, &mut |F| self.solve_held_block(F), wanted)
+        let solve = &mut |F: &mut Block| self.solve_held_block(F);
+        let freed = self.boundary.columns() - 6;
+        let mass = &mut self.mass_product();
+        smallest_modes(&mut self.pencil(freed, solve, mass), wanted)
     }
 
-    /// Lowest modes under the support of a solver, over all DoF.
+    /// Computes [`Self::fixed_modes`] and `held` of [`Self::held_modes`]; with two interfaces, with
+    /// no more solves than for the former.
     ///
-    /// * `dimension`: number of free DoF under that support.
-    /// * `solve`: replaces nodal forces by displacements.
-    fn lowest_modes(
-        &self,
-        dimension: usize,
-        solve: &mut dyn FnMut(&mut Block),
-        wanted: ModesWanted,
-    ) -> Result<Modes, ModesError> {
-        let mass = &mut |X: &Block, Y: &mut Block| self.model.M.block_product(X, Y);
-        let modes = smallest_modes(&mut Pencil { rows: self.model.size(), dimension, solve, mass }, wanted)?;
-        Ok(self.smoothed(modes, solve))
+    /// # Errors
+    /// [`ModesError`].
+    pub fn fixed_and_held_modes(&self, wanted: ModesWanted, held: usize) -> Result<(Modes, Modes), ModesError> {
+        let [T_B] = self.T_B.as_slice() else { return self.each_by_itself(wanted, held) };
+        if self.dimension() == 0 {
+            // All DoF follow the interfaces, so there is no basis of fixed modes.
+            return self.each_by_itself(wanted, held);
+        }
+        let solve = &mut |F: &mut Block| {
+            self.solve_constrained(F, None);
+        };
+        let mass = &mut self.mass_product();
+        let mut pencil = self.pencil(0, solve, mass);
+        let (fixed, held) = modes_of_two_supports(&mut pencil, wanted, &Released { T: T_B, C: &self.tip }, held)?;
+        let fixed = self.smoothed(fixed, |F| {
+            self.solve_constrained(F, None);
+        });
+        Ok((fixed, self.smoothed(held, |F| self.solve_held_block(F))))
+    }
+
+    fn each_by_itself(&self, wanted: ModesWanted, held: usize) -> Result<(Modes, Modes), ModesError> {
+        Ok((self.fixed_modes(wanted)?, self.held_modes(ModesWanted::Count(held))?))
     }
 
     /// Returns the modes unchanged, or refined to `ω² K⁻¹ M φ` if their residuals on the mesh are
     /// too large. This happens in thin plates, where a combination of a hundred vectors has ten
     /// times the rounding error of one solve.
-    fn smoothed(&self, mut modes: Modes, solve: &mut dyn FnMut(&mut Block)) -> Modes {
+    fn smoothed(&self, mut modes: Modes, solve: impl Fn(&mut Block)) -> Modes {
         if self.mode_residuals(&modes).iter().all(|residual| *residual <= ROUGH) {
             return modes;
         }
@@ -65,6 +83,20 @@ impl Condensation<'_> {
             shape *= *omega2;
         }
         modes
+    }
+
+    fn mass_product(&self) -> impl FnMut(&Block, &mut Block) {
+        |X, Y| self.model.M.block_product(X, Y)
+    }
+
+    /// Pencil of a solver that leaves `freed` boundary coordinates free.
+    fn pencil<'a>(
+        &self,
+        freed: usize,
+        solve: &'a mut dyn FnMut(&mut Block),
+        mass: &'a mut dyn FnMut(&Block, &mut Block),
+    ) -> Pencil<'a> {
+        Pencil { rows: self.model.size(), dimension: self.dimension() + freed, solve, mass }
     }
 
     /// Number of degrees of freedom with every interface clamped.
@@ -89,7 +121,10 @@ impl Condensation<'_> {
             self.solve_held_block(F);
             F.subtract_product(&R, &(&inverse * MR.gram(F)));
         };
-        self.lowest_modes(self.dimension() + self.boundary.columns() - 12, solve, wanted)
+        let mass = &mut self.mass_product();
+        let mut pencil = self.pencil(self.boundary.columns() - 6, solve, mass);
+        pencil.dimension -= 6;
+        smallest_modes(&mut pencil, wanted)
     }
 
     /// Row `i` of the boundary under the rigid motion that moves the first interface by `j`, from

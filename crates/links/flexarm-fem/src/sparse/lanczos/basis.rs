@@ -1,14 +1,9 @@
 //! Lanczos basis, built block by block, and the projected operator.
-//!
-//! Letters as in the module above: blocks `V_j`, M-orthonormal; `A_j`, `R_j` blocks of H; W the newest
-//! product. [`Basis::advance`] is one step of the recurrence.
 
-use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-use super::{Modes, ModesError, Pencil, Ritz};
+use super::{Modes, ModesError, Pencil, Released, Ritz};
 use crate::sparse::block::{Block, WIDTH, combine, grams, subtract_products};
-use crate::sparse::dense::symmetric_eigen;
 
 /// Remainder of a direction after orthogonalisation, relative to the largest θ, that is rounding.
 const NOISE: f64 = 1e-13;
@@ -23,56 +18,84 @@ const NEAR_DEPENDENT: f64 = 1e-4;
 
 /// M-orthonormal blocks `V_1 V_2 ...` with `H = Vᵀ M K⁻¹ M V`.
 pub(super) struct Basis {
-    blocks: Vec<Block>,
+    pub(super) blocks: Vec<Block>,
     /// Newest block, not yet multiplied; no columns if the space is exhausted.
     newest: Block,
     /// M times the newest block.
     mass_newest: Block,
     /// `H`, extended block by block.
-    projected: DMatrix<f64>,
+    pub(super) projected: DMatrix<f64>,
     /// `R_{j+1}`: coefficients of the newest block in the last product.
-    coupling: DMatrix<f64>,
+    pub(super) coupling: DMatrix<f64>,
+    /// Products with the shapes of a released support.
+    pub(super) beside: Option<Beside>,
     /// Dimension of the space.
     dimension: usize,
     solves: usize,
-    /// Length of the basis at which the projected operator is solved next.
-    next_check: usize,
+    next_look: usize,
+}
+
+/// Products of T, the shapes of a released support, with the basis.
+pub(super) struct Beside {
+    /// `Vᵀ M T`.
+    pub(super) X: DMatrix<f64>,
+    /// `V_1ᵀ M K⁻¹ M T`; zero for the later blocks.
+    pub(super) Y_1: DMatrix<f64>,
+    /// `Tᵀ M T`.
+    pub(super) G: DMatrix<f64>,
+    /// `Tᵀ M K⁻¹ M T`.
+    pub(super) S: DMatrix<f64>,
 }
 
 impl Basis {
-    /// First block: `K⁻¹ M` times pseudo-random vectors, the same on every run.
-    pub(super) fn start(pencil: &mut Pencil<'_>) -> Result<Self, ModesError> {
-        let mut X = Block::zeros(pencil.rows, WIDTH.min(pencil.dimension));
+    /// First block: `K⁻¹ M` times T and pseudo-random vectors, the same on every run.
+    pub(super) fn start(pencil: &mut Pencil<'_>, released: Option<&Released<'_>>) -> Result<Self, ModesError> {
+        let (rows, beside) = (pencil.rows, released.map_or(0, |released| released.T.width));
+        let mut W = Block::zeros(rows, WIDTH.min(beside + pencil.dimension));
         let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        for row in &mut X.rows {
-            for x in &mut row.0[..X.width] {
+        for (i, row) in W.rows.iter_mut().enumerate() {
+            for (k, x) in row.0[..W.width].iter_mut().enumerate() {
                 // xorshift64*, Vigna (2016); the upper bits as a number in (-1, 1).
                 state ^= state >> 12;
                 state ^= state << 25;
                 state ^= state >> 27;
-                *x = (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+                let random = (state.wrapping_mul(0x2545_f491_4f6c_dd1d) >> 11) as f64 / (1_u64 << 52) as f64 - 1.0;
+                *x = released.filter(|_| k < beside).map_or(random, |released| released.T.rows[i].0[k]);
             }
         }
-        let mut W = Block::zeros(pencil.rows, X.width);
-        (pencil.mass)(&X, &mut W);
-        let sizes2 = X.gram(&W).diagonal();
+        // W ← K⁻¹ M W, with the products of T that the released pencil needs.
+        let mut MW = Block::zeros(rows, W.width);
+        (pencil.mass)(&W, &mut MW);
+        let sizes2 = W.gram(&MW).diagonal();
+        W.clone_from(&MW);
         (pencil.solve)(&mut W);
-        let empty = Block::zeros(pencil.rows, 0);
+        let products = released.map(|released| {
+            let of_T = |A: DMatrix<f64>| A.columns(0, beside).into_owned();
+            (of_T(released.T.gram(&MW)), of_T(W.gram(&MW)).rows(0, beside).into_owned())
+        });
+        let empty = Block::zeros(rows, 0);
         let mut basis = Self {
             blocks: Vec::new(),
             newest: empty.clone(),
             mass_newest: empty,
             projected: DMatrix::zeros(0, 0),
             coupling: DMatrix::zeros(0, 0),
+            beside: None,
             dimension: pencil.dimension,
             solves: W.width,
-            next_check: 0,
+            next_look: 0,
         };
-        basis.append(W, X, pencil, sizes2.as_slice())?;
+        basis.append(W, MW, pencil, sizes2.as_slice())?;
         if basis.is_exhausted() {
             // No vector has mass.
             return Err(ModesError::NotFinite);
         }
+        basis.beside = products.map(|(G, S)| Beside {
+            X: DMatrix::zeros(0, beside),
+            Y_1: basis.coupling.columns(0, beside).into_owned(),
+            G: (&G + G.transpose()) * 0.5,
+            S: (&S + S.transpose()) * 0.5,
+        });
         Ok(basis)
     }
 
@@ -85,12 +108,17 @@ impl Basis {
         self.newest.width == 0
     }
 
-    /// Performs one step of the recurrence.
-    pub(super) fn advance(&mut self, pencil: &mut Pencil<'_>) -> Result<(), ModesError> {
+    /// Performs one step of the recurrence; `T` as at the start.
+    pub(super) fn advance(&mut self, pencil: &mut Pencil<'_>, T: Option<&Block>) -> Result<(), ModesError> {
         let empty = || Block::zeros(0, 0);
         let V = std::mem::replace(&mut self.newest, empty());
         let MV = std::mem::replace(&mut self.mass_newest, empty());
         let width = V.width;
+        if let (Some(beside), Some(T)) = (&mut self.beside, T) {
+            let (old, columns) = beside.X.shape();
+            beside.X = std::mem::take(&mut beside.X).resize(old + width, columns, 0.0);
+            beside.X.rows_mut(old, width).copy_from(&MV.gram(T));
+        }
         // Recurrence: W = K⁻¹ M V_j - V_{j-1} R_jᵀ - V_j A_j.
         let mut W = MV.clone();
         (pencil.solve)(&mut W);
@@ -113,7 +141,7 @@ impl Basis {
         // Append A_j to the diagonal of H and R_j beside it.
         let mut H = DMatrix::zeros(old + width, old + width);
         H.view_mut((0, 0), (old, old)).copy_from(&self.projected);
-        H.view_mut((old, old), (width, width)).copy_from(&symmetric_part(&A));
+        H.view_mut((old, old), (width, width)).copy_from(&((&A + A.transpose()) * 0.5));
         if old > 0 {
             let (now, before) = self.coupling.shape();
             H.view_mut((old, old - before), (now, before)).copy_from(&self.coupling);
@@ -171,7 +199,7 @@ impl Basis {
         }
         // Second pass (Cholesky) for orthonormality to rounding; R follows from both factors.
         let second = W.gram(&MW);
-        let Some(L) = symmetric_part(&second).cholesky() else {
+        let Some(L) = ((&second + second.transpose()) * 0.5).cholesky() else {
             return Err(ModesError::NotFinite);
         };
         let inverse = L.l().transpose().try_inverse().ok_or(ModesError::NotFinite)?;
@@ -186,59 +214,86 @@ impl Basis {
     }
 
     /// Whether the projected operator should be solved now; `count`: number of requested modes.
-    pub(super) fn is_check_due(&mut self, count: usize, limit: usize) -> bool {
+    pub(super) fn is_to_be_looked_at(&mut self, count: usize, limit: usize) -> bool {
         // The cost of the small eigenproblem grows with the cube of the basis, so a larger one is
         // solved less often.
-        if self.len() < self.next_check.max(2 * count + WIDTH) && !self.is_full(limit) {
+        if self.len() < self.next_look.max(2 * count + WIDTH) && !self.is_full(limit) {
             return false;
         }
-        self.next_check = self.len() + (self.len() / 12).max(1);
+        self.next_look = self.len() + (self.len() / 12).max(1);
         true
     }
 
-    /// Whether the basis has reached its size limit.
-    pub(super) fn is_full(&self, limit: usize) -> bool {
+    fn is_full(&self, limit: usize) -> bool {
         self.len() >= limit || self.is_exhausted()
     }
 
-    /// Eigenpairs of H with positive θ, largest first, and `‖R_{j+1} s_last‖ / θ` of each; `None` if
-    /// not finite.
-    pub(super) fn ritz(&self) -> Option<Ritz> {
-        let (eigenvalues, eigenvectors) = symmetric_eigen(&self.projected)?;
-        let positive: Vec<usize> = (0..eigenvalues.len()).rev().filter(|k| eigenvalues[*k] > 0.0).collect();
-        let theta: Vec<f64> = positive.iter().map(|k| eigenvalues[*k]).collect();
-        let vectors = eigenvectors.select_columns(&positive);
-        // The coupling of an exhausted basis has no rows, so its residuals are zero.
-        let last = self.coupling.ncols();
-        let remainders = &self.coupling * vectors.rows(self.len() - last, last);
-        let residuals = remainders.column_iter().zip(&theta).map(|(r, theta)| r.norm() / theta).collect();
-        Some(Ritz { theta, vectors, residuals })
+    /// Returns an error if the basis has reached its size limit.
+    pub(super) fn refuse_if_full(&self, ritz: &Ritz, wanted: usize, limit: usize) -> Result<(), ModesError> {
+        if !self.is_full(limit) {
+            return Ok(());
+        }
+        let residual = ritz.residuals.iter().take(wanted).fold(0.0, |worst: f64, r| worst.max(*r));
+        Err(ModesError::NotConverged { found: ritz.converged(), wanted, basis: self.len(), residual })
     }
 
-    /// Computes the shapes `φ = V s` of the first `count` Ritz pairs.
+    /// Ritz pairs, largest θ first.
+    pub(super) fn ritz(&self) -> Option<Ritz> {
+        let (theta, vectors) = Ritz::of(&self.projected)?;
+        let residuals = self.residuals(&theta, &vectors);
+        let beside = DMatrix::zeros(0, theta.len());
+        Some(Ritz { theta, vectors, beside, residuals })
+    }
+
+    /// `‖R_{j+1} s_last‖ / θ` of each vector over the basis.
+    pub(super) fn residuals(&self, theta: &[f64], vectors: &DMatrix<f64>) -> Vec<f64> {
+        if self.is_exhausted() {
+            return vec![0.0; theta.len()];
+        }
+        let last = self.coupling.ncols();
+        let bottom = vectors.rows(self.len() - last, last);
+        (&self.coupling * bottom).column_iter().zip(theta).map(|(r, theta)| r.norm() / theta).collect()
+    }
+
+    /// Computes the requested number of modes of each set of Ritz pairs; `T`: shapes that extend
+    /// the basis.
     ///
     /// The shapes overwrite the basis, because storing both would double the memory.
-    pub(super) fn into_modes(self, ritz: &Ritz, count: usize) -> Modes {
+    pub(super) fn into_modes<const N: usize>(self, of: [(&Ritz, usize); N], T: Option<&Block>) -> [Modes; N] {
         let rows = self.newest.rows.len();
-        let Self { mut blocks, newest, mass_newest, solves, .. } = self;
+        let Self { mut blocks, newest, mass_newest, projected, solves, .. } = self;
         drop((newest, mass_newest));
-        let firsts = || (0..count).step_by(WIDTH);
-        let S: Vec<_> =
-            firsts().map(|first| ritz.vectors.columns(first, WIDTH.min(count - first)).into_owned()).collect();
-        combine(&mut blocks, &S);
-        let mut shapes = DMatrix::zeros(rows, count);
-        for (first, block) in firsts().zip(blocks) {
-            block.put_columns(&mut shapes, first);
-        }
-        for mut shape in shapes.column_iter_mut() {
-            // Sign: the largest entry is positive.
-            let larger = |peak: f64, x: &f64| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak };
-            if shape.iter().fold(0.0, larger) < 0.0 {
-                shape.neg_mut();
+        blocks.extend(T.cloned());
+        let vectors = projected.nrows() + T.map_or(0, |T| T.width);
+        // Shapes V s, a block of columns at a time.
+        let mut factors = Vec::new();
+        for (ritz, count) in of {
+            for first in (0..count).step_by(WIDTH) {
+                let width = WIDTH.min(count - first);
+                let mut C = DMatrix::zeros(vectors, width);
+                C.rows_mut(0, projected.nrows()).copy_from(&ritz.vectors.columns(first, width));
+                C.rows_mut(projected.nrows(), ritz.beside.nrows()).copy_from(&ritz.beside.columns(first, width));
+                factors.push(C);
             }
         }
-        let omega2 = ritz.theta[..count].iter().map(|theta| 1.0 / theta).collect();
-        Modes { omega2, shapes, residuals: ritz.residuals[..count].to_vec(), solves }
+        combine(&mut blocks, &factors);
+        let mut combined = blocks.into_iter();
+        of.map(|(ritz, count)| {
+            let mut shapes = DMatrix::zeros(rows, count);
+            for (first, block) in (0..count).step_by(WIDTH).zip(&mut combined) {
+                block.put_columns(&mut shapes, first);
+            }
+            for mut shape in shapes.column_iter_mut() {
+                // Sign: the largest entry is positive.
+                let peak =
+                    shape.iter().fold(0.0, |peak: f64, x| if x.abs() > peak.abs() * (1.0 + 1e-9) { *x } else { peak });
+                if peak < 0.0 {
+                    shape.neg_mut();
+                }
+            }
+            let omega2 = ritz.theta[..count].iter().map(|theta| 1.0 / theta).collect();
+            Modes { omega2, shapes, residuals: ritz.residuals[..count].to_vec(), solves }
+        })
     }
 }
 
