@@ -163,6 +163,7 @@ impl<T: Real> Data<T> {
 
     /// Returns `X_WF`, the pose of a frame in the world, from the last
     /// [`crate::forward_kinematics`].
+    #[inline(always)]
     pub fn X_WF(&self, frame: &Frame) -> Pose<T> {
         let (X_WB, X_BF) = (&self.X_WB[frame.body], &frame.X_BF);
         let R_WB = X_WB.rotation.matrix();

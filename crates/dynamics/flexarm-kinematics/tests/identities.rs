@@ -642,6 +642,6 @@ fn a_joint_axis_and_its_column_describe_one_motion() {
     }
     eprintln!("{worst:?}");
     for (found, bound) in worst.into_iter().zip([1e-14, 1e-14, 1e-13, 1e-9]) {
-        assert!(found < bound, "{found:e} {bound:e}");
+        assert!(found < bound, "{found:e} {bound:e}"); // measured 4.4e-16, 0, 0 and 0
     }
 }
