@@ -71,7 +71,7 @@ fn a_rod_encloses_the_area_of_its_polygon_times_its_length() {
     let volume: f64 = triangles.iter().map(tetrahedron).sum();
     let area = 0.5 * f64::from(n) * radius * radius * (std::f64::consts::TAU / f64::from(n)).sin();
     let error = volume / (area * (to - from).norm()) - 1.0;
-    assert!(error.abs() < 1e-13, "{error:e}");
+    assert!(error.abs() < 1e-13, "{error:e}"); // measured 2e-16
     assert_eq!(prism([&from, &from], radius, n, 1e-6), None);
 }
 

@@ -17,11 +17,11 @@ fn folder(name: &str) -> PathBuf {
 /// Truth: line and column, from 1, counted by hand.
 #[test]
 fn errors_in_motion_files_of_every_format_have_their_line_and_column() {
-    let waypoints = "format = 1\nunit = \"deg\"\njoints = [\"joint_a1\"]\n";
+    let waypoints = "format = 1\nunit = \"deg\"\njoints = [\"joint_1\"]\n";
     let home = "PTP {A1 0, A2 -60, A3 90, A4 0, A5 60, A6 0}\n";
     let cases = [
-        ("samples.csv", "time,joint_a1\n0,0\n1,x\n".to_owned(), "3:3", "\"x\" is not a number"),
-        ("table.txt", "t[s];joint_a1[deg]\n0,5;1\n1.5;2\n".to_owned(), "3:1", "decimal points"),
+        ("samples.csv", "time,joint_1\n0,0\n1,x\n".to_owned(), "3:3", "\"x\" is not a number"),
+        ("table.csv", "t[s];joint_1[deg]\n0,5;1\n1.5;2\n".to_owned(), "3:1", "decimal points"),
         (
             "moves.toml",
             format!("{waypoints}start = [0]\n[[move]]\nto = [9]\nduration = -2\n"),
@@ -41,13 +41,13 @@ fn errors_in_motion_files_of_every_format_have_their_line_and_column() {
         ("mill.nc", "G21 G90\nG41 D1 X5\n".to_owned(), "2:1", "cutter radius"),
         (
             "plan.yaml",
-            "joint_names: [joint_a1]\npoints:\n- {positions: [x], time_from_start: 1.0}\n".to_owned(),
+            "joint_names: [joint_1]\npoints:\n- {positions: [x], time_from_start: 1.0}\n".to_owned(),
             "3:16",
             "expected numbers alone",
         ),
         (
             "plan.json",
-            "{\"joint_names\": [\"joint_a1\"],\n \"points\": [{\"positions\": [0.0]}]}\n".to_owned(),
+            "{\"joint_names\": [\"joint_1\"],\n \"points\": [{\"positions\": [0.0]}]}\n".to_owned(),
             "2:13",
             "has no `time_from_start`",
         ),
@@ -69,11 +69,11 @@ fn warnings_about_motion_files_have_their_line_and_a_code_for_each_kind() {
     let program =
         "DEF x()\nPTP {A1 0, A2 -60, A3 90, A4 0, A5 60, A6 0}\n  $OUT[1]=TRUE\nPTP {A1 9}\n$OUT[2]=TRUE\nEND\n";
     let cases = [
-        ("cut.csv", "time,joint_a1\n0,0\n1,0\n1,0\n2,0\n3", "motion-cut", "6"),
-        ("cut.csv", "time,joint_a1\n0,0\n1,0\n1,0\n2,0\n3", "table-repeated-rows", "4"),
-        ("unit.txt", "t;joint_a1;wear\n0;0;1\n1;0;1\n", "table-unit", "1"),
-        ("unit.txt", "t;joint_a1;wear\n0;0;1\n1;0;1\n", "table-time-unit", "1:1"),
-        ("unit.txt", "t;joint_a1;wear\n0;0;1\n1;0;1\n", "table-columns", "1"),
+        ("cut.csv", "time,joint_1\n0,0\n1,0\n1,0\n2,0\n3", "motion-cut", "6"),
+        ("cut.csv", "time,joint_1\n0,0\n1,0\n1,0\n2,0\n3", "table-repeated-rows", "4"),
+        ("unit.txt", "t;joint_1;wear\n0;0;1\n1;0;1\n", "table-unit", "1"),
+        ("unit.txt", "t;joint_1;wear\n0;0;1\n1;0;1\n", "table-time-unit", "1:1"),
+        ("unit.txt", "t;joint_1;wear\n0;0;1\n1;0;1\n", "table-columns", "1"),
         ("outputs.src", program, "tool-path", "3:3"),
     ];
     let (robot, folder) = (kr210(), folder("warnings"));
@@ -88,10 +88,10 @@ fn warnings_about_motion_files_have_their_line_and_a_code_for_each_kind() {
     }
     // Where the whole curve of a joint is meant, the joint is named.
     let path = folder.join("start.csv");
-    std::fs::write(&path, "time,joint_a1\n0,0\n1,0.5\n2,1\n").unwrap();
+    std::fs::write(&path, "time,joint_1\n0,0\n1,0.5\n2,1\n").unwrap();
     let caveats = Motion::load(&path, &robot).unwrap().caveats();
     let start = caveats.iter().find(|caveat| caveat.code == "motion-start-speed").unwrap();
-    assert!((start.location.as_str(), start.value) == ("joint_a1", Some(0.5)), "{start:?}");
-    assert!(start.message.starts_with(&format!("{}: joint \"joint_a1\" starts", path.display())), "{start:?}");
+    assert!((start.location.as_str(), start.value) == ("joint_1", Some(0.5)), "{start:?}");
+    assert!(start.message.starts_with(&format!("{}: joint \"joint_1\" starts", path.display())), "{start:?}");
     std::fs::remove_dir_all(folder).unwrap();
 }
