@@ -117,6 +117,7 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
          fit, which starts from the nominal robot; pose of the tracker and place of the reflector are found as well. The robot \
          file that the fit writes predicts the other poses.",
     );
+    // Distances from the tracker's places, of poses in the fit and of poses outside it.
     let heads = ["fitted", "numbers", "fitted poses", "other poses", "in their 95 % interval"];
     let mut table = Table::new("Root mean square of the distance from the measured place [mm].", &heads);
     for fit in all {
@@ -130,6 +131,8 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
         ]);
     }
     case.table(table);
+    // Prediction against the tracker at the other poses, and the share of their numbers within the
+    // stated uncertainty; the file that the fit writes must have the residuals that it reports.
     let truth = "laser tracker";
     for fit in all {
         let [own, others] = fit.rms_mm();
@@ -147,6 +150,7 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
             Bound::AtMost(WRITTEN),
         );
     }
+    // Gears that carry little weight must be reported as not identifiable.
     if let Some(last) = all.last() {
         let of = |joint: usize| format!("drive.joint_{joint}.gearbox.stiffness");
         let is_identifiable =
@@ -154,6 +158,7 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
         let count = (4..=6).filter(is_identifiable).count() as f64;
         case.claim("determined stiffnesses of joints 4 to 6, which carry little", "statics", count, Bound::AtMost(0.0));
     }
+    // The loads on the joints, which explain the small effect of the gears.
     let torques: Vec<String> = weight_torques.iter().map(|torque| format!("{torque:.1}")).collect();
     let [before, after] = [&all[0], &all[1]].map(|fit| fit.rms_mm()[1]);
     case.text(format!(

@@ -124,6 +124,7 @@ impl Table {
             shape_functions(kind, *xi, &mut N, &mut dN);
             table.xi.push(*xi);
             table.weight.push(*weight);
+            // N_i, then dN_i/dξ_c by c, then N_i N_j for j ≥ i.
             table.N.extend(&N[..n]);
             for c in 0..3 {
                 table.dN.extend(dN[..n].iter().map(|d| d[c]));

@@ -131,6 +131,7 @@ fn the_energy_of_the_stress_is_that_of_the_amplitudes() {
         let mut bar = Bar::new(kind, [6, 2, 2], [0.4, 0.1, 0.05]);
         bar.material = Material::ALUMINIUM;
         let (largest, smallest) = bar.reduced(4, |source| {
+            // Displacement of six interface amplitudes and four modes.
             let model = source.condensation.model();
             let (T, modes) = (source.condensation.shapes(), &source.fixed_modes.shapes);
             let eta = [1e-4, -2e-4, 3e-4, 1e-3, 2e-3, -1e-3, 1e-5, 2e-5, -1e-5, 3e-5];
@@ -139,6 +140,7 @@ fn the_energy_of_the_stress_is_that_of_the_amplitudes() {
                 let column = if k < 6 { T.column(6 + k) } else { modes.column(k - 6) };
                 u.column_mut(0).axpy(*eta, &column, 1.0);
             }
+            // Energy of the stress over the points, σᵀ C σ / 2, isotropic.
             let (materials, quadrature) = (source.materials, source.quadrature);
             let recovery = StressRecovery { mesh: source.mesh, model, materials, quadrature };
             let (E, nu) = (materials[0].E, materials[0].nu);
