@@ -1,4 +1,7 @@
 //! The page of the case, second half: links and drives.
+//!
+//! The first table compares links, drives and both; the second, with elastic drives, compares steppers
+//! and models of the links. Truth: modal links, stepper with error control. Not here: numbers (`drives.rs`).
 
 use flexarm_draw::{CurveLook, Panel};
 

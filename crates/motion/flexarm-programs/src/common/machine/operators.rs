@@ -1,4 +1,7 @@
 //! Operators on numbers, truth values and texts.
+//!
+//! Start at [`combine`]; indexing, calls and frames are in `evaluate.rs`. Errors have the span of the
+//! operand.
 
 use super::LARGEST;
 use crate::common::tree::Operator;
