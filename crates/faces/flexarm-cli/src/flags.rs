@@ -40,7 +40,6 @@ pub fn flag(setting: Setting) -> &'static str {
         Setting::Payload => "--payload",
         Setting::Seconds => "--seconds",
         Setting::ToolMotion => "--tool-motion",
-        // `convert` takes formats, `response` frequencies.
         Setting::ReadFormat | Setting::LowestFrequency => "--from",
         Setting::WrittenFormat | Setting::HighestFrequency => "--to",
         Setting::Points => "--points",

@@ -106,6 +106,21 @@ impl Fitted {
     }
 }
 
+/// Claims of a fit: prediction against the tracker at the other poses, the share of their numbers
+/// within the stated uncertainty, and the residuals of the written file, which must be those reported.
+fn claims_of(case: &mut Case, fit: &Fitted) {
+    let truth = "laser tracker";
+    let [own, others] = fit.rms_mm();
+    let reported = 1e3 * 3f64.sqrt() * fit.found.residual.after;
+    let name = fit.name;
+    let distance = format!("{name}: distance at other poses [m]");
+    case.claim(distance, truth, 1e-3 * others, Bound::AtMost(1e-3 * UNSEEN_MM));
+    case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtLeast(COVERED[0]));
+    case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtMost(COVERED[1]));
+    let written = (own / reported - 1.0).abs();
+    case.claim(format!("{name}: written file against reported residuals"), "identity", written, Bound::AtMost(WRITTEN));
+}
+
 fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
     let mut case = Case::new(
         "calibrated-arm",
@@ -131,24 +146,8 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
         ]);
     }
     case.table(table);
-    // Prediction against the tracker at the other poses, and the share of their numbers within the
-    // stated uncertainty; the file that the fit writes must have the residuals that it reports.
-    let truth = "laser tracker";
     for fit in all {
-        let [own, others] = fit.rms_mm();
-        let reported = 1e3 * 3f64.sqrt() * fit.found.residual.after;
-        let name = fit.name;
-        let distance = format!("{name}: distance at other poses [m]");
-        case.claim(distance, truth, 1e-3 * others, Bound::AtMost(1e-3 * UNSEEN_MM));
-        case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtLeast(COVERED[0]));
-        case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtMost(COVERED[1]));
-        let written = (own / reported - 1.0).abs();
-        case.claim(
-            format!("{name}: written file against reported residuals"),
-            "identity",
-            written,
-            Bound::AtMost(WRITTEN),
-        );
+        claims_of(&mut case, fit);
     }
     // Gears that carry little weight must be reported as not identifiable.
     if let Some(last) = all.last() {
