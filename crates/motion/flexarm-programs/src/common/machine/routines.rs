@@ -11,6 +11,9 @@ use crate::common::tree::{Action, Argument, Expr, Kind, Routine, Statement};
 use crate::common::value::Value;
 use crate::common::{Result, Span, fail};
 
+/// Parameters that return values, with the arguments that take them.
+type Returned = Vec<(Rc<str>, Expr)>;
+
 impl<D: Dialect> Machine<'_, D> {
     /// Adds routines; of several with one name the first counts.
     pub(crate) fn add(&mut self, routines: impl IntoIterator<Item = Routine>) {
@@ -71,14 +74,9 @@ impl<D: Dialect> Machine<'_, D> {
 
     /// Returns the variables of a routine at its beginning, and the parameters that return values
     /// with the arguments that take them.
-    fn parameters(
-        &mut self,
-        routine: &Routine,
-        arguments: &[Argument],
-        span: Span,
-    ) -> Result<(Variables, Vec<(Rc<str>, Expr)>)> {
+    fn parameters(&mut self, routine: &Routine, arguments: &[Argument], span: Span) -> Result<(Variables, Returned)> {
         let mut scope = Variables::new();
-        let mut returned: Vec<(Rc<str>, Expr)> = Vec::new();
+        let mut returned = Returned::new();
         let mut position = 0;
         for argument in arguments {
             // The parameter of this argument, by its name or its position.
