@@ -130,7 +130,7 @@ pub fn read_yaml<'t, E: From<YamlError>>(
         if count > most {
             return Err(fail(format!("more than {most} numbers and texts")));
         }
-        // What is done belongs to the innermost open collection, or is a document.
+        // A finished node belongs to the innermost open collection, or is a document.
         match open.last_mut() {
             None => take(done.node)?,
             Some(outer) => outer.add(done),

@@ -1,4 +1,6 @@
 //! Merging of many similar messages into one.
+//!
+//! Start at [`gathered`]. Not here: the messages themselves (`Finding`).
 
 /// Minimum number of similar messages that are merged.
 const MANY: usize = 3;

@@ -194,6 +194,7 @@ pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -
         text
     };
     while let Some(letter) = letters.next() {
+        // Within quotes only a quote has a meaning: doubled it is a letter, alone the end.
         if quoted {
             match letter {
                 '"' if letters.next_if_eq(&'"').is_some() => field.push('"'),
@@ -202,6 +203,7 @@ pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -
             }
             continue;
         }
+        // A separator ends a field, except after another one if several count as one.
         if is_separator(letter) {
             if !(runs && gap) {
                 fields.push(close(&mut field, &mut was_quoted));
@@ -210,6 +212,7 @@ pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -
             continue;
         }
         gap = false;
+        // A quote at the beginning of a field opens it.
         match letter {
             '"' if field.trim().is_empty() => (field, quoted, was_quoted) = (String::new(), true, true),
             other => field.push(other),

@@ -75,13 +75,8 @@ pub fn inverse_kinematics(
     model.check_size("q_start", q_start.len());
     let n = model.n_actuated();
     let limits: Vec<(f64, f64)> = model.coordinates()[..n].iter().map(|c| (c.limits.lower, c.limits.upper)).collect();
-    let clamp = |q: &mut DVector<f64>| {
-        for (k, (lower, upper)) in limits.iter().enumerate() {
-            q[k] = q[k].max(*lower).min(*upper);
-        }
-    };
     let mut q = q_start.clone();
-    clamp(&mut q);
+    clamp(&mut q, &limits);
     let mut J = Matrix6xX::zeros(model.nv());
     let mut error = pose_error(model, data, frame, X_WT, &q);
     let mut damping = 1e-4;
@@ -109,7 +104,7 @@ pub fn inverse_kinematics(
             let step = factor.solve(&Jw.tr_mul(&e));
             let mut trial = q.clone();
             trial.rows_mut(0, n).zip_apply(&step, |x, s| *x += s.clamp(-0.5, 0.5));
-            clamp(&mut trial);
+            clamp(&mut trial, &limits);
             let trial_error = pose_error(model, data, frame, X_WT, &trial);
             if weigh(&trial_error).norm() < e.norm() {
                 (q, error) = (trial, trial_error);
@@ -124,6 +119,13 @@ pub fn inverse_kinematics(
         }
     }
     Err(failure(model, frame, options.max_iterations, &error, &q))
+}
+
+/// Moves coordinates beyond their limits to the limits.
+fn clamp(q: &mut DVector<f64>, limits: &[(f64, f64)]) {
+    for (k, (lower, upper)) in limits.iter().enumerate() {
+        q[k] = q[k].max(*lower).min(*upper);
+    }
 }
 
 /// Zeroes the columns of joints at a limit that the gradient of the error pushes outward.

@@ -1,7 +1,8 @@
 //! Parts of a drive: nonlinear springs, friction, and one axis of a sampled controller.
 //!
 //! Start at [`ServoAxis`], [`Friction`] and [`SpringCurve`]. All quantities are on the joint side
-//! of the gear; `q` are all coordinates of the arm. Not here: rotors (in the tree) and linear gearbox springs (elements of the arm).
+//! of the gear; `q` are all coordinates of the arm. Not here: rotors (in the tree) and linear
+//! gearbox springs (elements of the arm).
 
 use crate::guide::Guide;
 

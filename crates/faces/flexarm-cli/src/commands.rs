@@ -205,6 +205,7 @@ pub(crate) fn run(cli: &Cli, line: &[OsString]) -> Result<ExitCode, Failure> {
         Command::View(args) => view::run(terminal, args),
         #[cfg(not(target_family = "wasm"))]
         Command::Serve(args) => serve::run(terminal, args),
+        // Pages and scripts that are only printed.
         Command::Format { page } => Ok(written(terminal, "page", page.text().into())),
         Command::Completions { shell } => {
             let mut script = Vec::new();

@@ -1,4 +1,6 @@
 //! `flexarm convert`: arguments and table.
+//!
+//! Start at [`run`]. Not here: words of the formats (`formats.rs`), the conversion (`flexarm`).
 
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

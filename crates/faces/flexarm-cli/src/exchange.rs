@@ -1,4 +1,7 @@
 //! `flexarm import` and `flexarm export`: from flags to a job.
+//!
+//! Start at [`import`] and [`export`]. Not here: the flags (`exchange_args.rs`), the work
+//! (`flexarm-linkmaker`).
 
 use std::process::ExitCode;
 

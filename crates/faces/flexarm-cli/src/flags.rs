@@ -1,4 +1,7 @@
 //! Names of the library's settings on the command line.
+//!
+//! Messages of the library name a setting; each interface has such a table. Not here: parsing
+//! (`args.rs`).
 
 use flexarm::settings::{Names, Setting};
 

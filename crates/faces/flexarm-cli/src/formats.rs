@@ -1,4 +1,7 @@
 //! Formats of recordings as command-line words, all taken from the table of the library.
+//!
+//! Help texts and choices follow the formats that this build has. Not here: readers and writers
+//! (`flexarm-log`).
 
 use std::path::PathBuf;
 

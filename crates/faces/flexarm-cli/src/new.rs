@@ -161,6 +161,24 @@ fn first_run(terminal: &Terminal, made: &NewRobot, folder: &Path, overwrite: boo
     Ok(result?.summary)
 }
 
+/// Returns the table of the joints with the drives that were chosen for their torques.
+fn joints(made: &NewRobot) -> String {
+    let mut t = table(&["joint", "torque of weight", "with speeding up", "limit", "reducer, N m/rad", "range"]);
+    for joint in &made.joints {
+        let drive = made.drives.iter().find(|d| d.joint == joint.name);
+        let limit = joint.effort.map_or_else(|| "none".to_owned(), |e| format!("{e:.1}"));
+        t.add_row(vec![
+            joint.name.clone(),
+            format!("{:.1}", joint.weight_torque),
+            format!("{:.1}", joint.needed_torque),
+            if joint.effort_fault.is_some() && joint.effort.is_some() { format!("({limit})") } else { limit },
+            drive.map_or_else(String::new, |d| format!("{:.3e}", d.stiffness)),
+            drive.map_or_else(String::new, |d| format!("{:.1e} to {:.1e}", d.low, d.high)),
+        ]);
+    }
+    lines(&t)
+}
+
 fn text(made: &NewRobot) -> String {
     let mut out = format!(
         "{}: {} from {:?} to the tool {:?}\n",
@@ -176,21 +194,7 @@ fn text(made: &NewRobot) -> String {
         made.payload.mass,
         if made.payload.assumed { " (assumed)" } else { "" }
     );
-    // Joints with the drives that were chosen for their torques.
-    let mut t = table(&["joint", "torque of weight", "with speeding up", "limit", "reducer, N m/rad", "range"]);
-    for joint in &made.joints {
-        let drive = made.drives.iter().find(|d| d.joint == joint.name);
-        let limit = joint.effort.map_or_else(|| "none".to_owned(), |e| format!("{e:.1}"));
-        t.add_row(vec![
-            joint.name.clone(),
-            format!("{:.1}", joint.weight_torque),
-            format!("{:.1}", joint.needed_torque),
-            if joint.effort_fault.is_some() && joint.effort.is_some() { format!("({limit})") } else { limit },
-            drive.map_or_else(String::new, |d| format!("{:.3e}", d.stiffness)),
-            drive.map_or_else(String::new, |d| format!("{:.1e} to {:.1e}", d.low, d.high)),
-        ]);
-    }
-    out += &lines(&t);
+    out += &joints(made);
     out += "torques in N m with payload; limits in brackets are implausible and not used\n\n";
     // Links with their sections.
     let mut t = table(&["link", "mm", "kg", "section"]);

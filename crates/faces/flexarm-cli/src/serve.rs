@@ -1,4 +1,7 @@
 //! `flexarm serve`: serves the web page, on which the program runs as WebAssembly, on this machine.
+//!
+//! Start at [`run`]; [`requested`] turns an address into a path inside the folder. Local requests
+//! only. Not here: the page itself (`web/`).
 
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Component, Path, PathBuf};

@@ -29,7 +29,7 @@ pub enum FmuError {
     /// A list has another number of values than the plant has places for.
     #[error("{what}: {found} value(s) given, expected {expected}")]
     Length {
-        /// What the list is.
+        /// Name of the list.
         what: &'static str,
         /// Number of values given.
         found: usize,

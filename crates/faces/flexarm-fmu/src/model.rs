@@ -102,7 +102,7 @@ impl FmuModel {
         let options = options(settings, None);
         let pose = first_pose(&arm, settings);
         let live = arm.live(Some(&pose), options.step_s, &options)?;
-        // What the variables depend on: the arm at its first pose, and whether it has equations of motion.
+        // Variables depend on the arm at its first pose, and on whether it has equations of motion.
         let has_acceleration = !settings.stepper.entry().maximal;
         let equations = arm.equations(Some(&pose), &LiveOptions::default()).ok();
         let equations = equations.filter(|own| has_acceleration && !own.coordinates().is_empty());

@@ -327,6 +327,7 @@ impl PyArm {
     ) -> PyResult<PyDeflections> {
         let raises = word("errors", errors, &[("raise", true), ("nan", false)])?;
         let robot = self.robot.bind(py);
+        // Scenarios, one or one per run, and the parameters that vary over them.
         let scenarios = match runs.filter(|runs| !is_one(runs)) {
             Some(runs) => Scenarios::Each(scenarios(robot, runs)?),
             None => Scenarios::One(Box::new(scenario(robot, runs, None, None, None)?)),
@@ -334,6 +335,7 @@ impl PyArm {
         let (mass, com, inertia) = (payload_mass, payload_com, payload_inertia);
         let given = Parameters { stiffness, damping, time_scale, mass, com, inertia };
         let variations = variations(robot, scenarios, &given)?;
+        // All runs without the interpreter's lock.
         let options = RunOptions { ignore_limits, ..run_options(step, stepper, stepper_options)? };
         let step_s = options.step_s;
         let arm = self.arm.clone();

@@ -1,4 +1,7 @@
 //! Caveats (probable mistakes in inputs, limits of results) as warnings of their own class.
+//!
+//! Start at [`answer`]: a result as a dict, with its caveats issued. Not here: the catalogue
+//! (`flexarm-run`).
 
 use flexarm::Finding;
 use flexarm::settings::{gathered, written};

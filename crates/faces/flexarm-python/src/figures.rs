@@ -1,4 +1,6 @@
 //! Figures of a result with the keys of `--json`, and its caveats; computed, or from a pickle.
+//!
+//! Start at [`Figures::of`]. Not here: arrays (`parts.rs`).
 
 use std::sync::Arc;
 

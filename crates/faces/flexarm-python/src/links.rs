@@ -130,6 +130,7 @@ pub(crate) fn import_link<'py>(
     output: Option<PathBuf>,
     overwrite: bool,
 ) -> PyResult<Bound<'py, PyAny>> {
+    // Messages name the keywords of Python.
     crate::command::name_keywords();
     let mut frames = Vec::new();
     for text in at.iter().flatten() {

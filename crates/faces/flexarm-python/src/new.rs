@@ -1,4 +1,6 @@
 //! A robot file from a robot description.
+//!
+//! Start at [`new_robot`]. Not here: the draft of the file (`flexarm-new`).
 
 use std::path::PathBuf;
 

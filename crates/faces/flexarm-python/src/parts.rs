@@ -1,4 +1,7 @@
 //! Results as named parts that can be pickled: numbers as arrays, the rest as plain values.
+//!
+//! Arrays are flat; [`Parts::shaped`] checks their size. Not here: which results can be restored
+//! (`restore.rs`).
 
 use pyo3::conversion::FromPyObjectOwned;
 use pyo3::exceptions::PyValueError;

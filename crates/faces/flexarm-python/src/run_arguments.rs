@@ -1,4 +1,7 @@
 //! Arguments of runs: motions and scenarios, options, outputs, and the progress function.
+//!
+//! Not here: words and numbers of settings (`values.rs`), one motion or scenario (`scenario.rs`),
+//! results (`run.rs`).
 
 use std::collections::HashMap;
 

@@ -1,4 +1,6 @@
 //! Derivatives of the TCP error along a motion with respect to the parameters of the robot.
+//!
+//! Start at [`sensitivity`]. Not here: the derivatives (`flexarm-sensitivity`).
 
 use std::path::PathBuf;
 

@@ -1,4 +1,6 @@
 //! Studies of many runs, defined by a file.
+//!
+//! Start at [`sweep`]. Not here: the study (`flexarm-sweep`).
 
 use std::ops::ControlFlow;
 use std::path::PathBuf;

@@ -1,4 +1,7 @@
 //! Colours of a recording: those of [`palette`] on a dark background, and the scale for distances.
+//!
+//! Numbers are those of runs, links, drives or joints. Not here: the palette (`flexarm-draw`), views
+//! (`layout.rs`).
 
 use rerun::{Color, Rgba32};
 

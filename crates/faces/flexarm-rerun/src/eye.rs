@@ -1,4 +1,6 @@
 //! Initial viewpoint of a recording.
+//!
+//! Start at [`eye`]; world axes, m. Not here: views and panels (`layout.rs`).
 
 use nalgebra::{Rotation3, Vector3};
 

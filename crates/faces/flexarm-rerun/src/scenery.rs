@@ -56,6 +56,7 @@ fn archetype(form: &SceneryForm) -> Box<dyn AsComponents> {
         }
         SceneryForm::Surface { places, triangles, colors } => {
             let mesh = Mesh3D::new(places.iter().copied()).with_triangle_indices(triangles.iter().copied());
+            // One colour tints the whole mesh; otherwise there is one per vertex.
             match colors[..] {
                 [[r, g, b, a]] => {
                     Box::new(mesh.with_albedo_factor(AlbedoFactor(Rgba32::from_unmultiplied_rgba(r, g, b, a))))

@@ -1,4 +1,7 @@
 //! The error of a file that cannot be read.
+//!
+//! [`FeFileError`] states file, line or byte, value found, value expected, remedy. Not here: faults of
+//! a mesh that can be read (`flexarm-fem`).
 
 use std::fmt;
 

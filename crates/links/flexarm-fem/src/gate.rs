@@ -95,6 +95,7 @@ pub fn check_matrix12(
     let s = diagonal_scale(WHAT, K, limits)?;
     let asymmetry = check_symmetry(WHAT, K, &s, limits)?;
 
+    // A rigid motion of both ends must cost no force.
     let residual = rigid_body_residual(K, &s, p_AB);
     if !(residual.value <= limits.rigid_body_residual) {
         return Err(FemError::MovesUnderRigidMotion {
@@ -107,6 +108,7 @@ pub fn check_matrix12(
         });
     }
 
+    // K_BB is definite, and the other blocks follow from it by that motion.
     let K_BB = symmetric_part(&K.fixed_view::<6, 6>(6, 6).into_owned());
     let (min_eigenvalue, condition) = check_definite("K_BB", &K_BB, limits)?;
     let block_identity = block_identity(K, &K_BB, &s, p_AB);

@@ -155,6 +155,7 @@ impl Material {
             true => String::new(),
             false => format!(" ({:.4e} in units {units})", value / unit),
         };
+        // Each constant outside the range of solids, with the unit that would explain it.
         let moduli = self.usual_moduli();
         if !moduli.contains(&self.E) {
             warnings.push(format!(

@@ -216,7 +216,7 @@ fn states(mut topic: Topic, has_clock: bool, caveats: &mut FileCaveats<'_>) -> R
         differ = differ.max(counts.differ);
         lines.push(line);
     }
-    // What was changed.
+    // Caveats about changes to the messages.
     if sorted > 0 {
         caveats.note(
             "motion-stamps",

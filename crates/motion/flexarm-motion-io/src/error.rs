@@ -1,4 +1,7 @@
 //! Errors of messages and bags: place, value found, value expected and remedy.
+//!
+//! [`MotionError`] leaves the crate; parsers raise [`PlacedProblem`], which gets its file last. Lines
+//! and columns count from 1. Not here: caveats about motions that can be read (`assemble.rs`).
 
 use std::path::PathBuf;
 

@@ -19,10 +19,13 @@
 //!
 //! | what | read by | messages |
 //! | --- | --- | --- |
-//! | YAML and JSON, also as printed by `ros2 topic echo` and `rostopic echo` | [`read_text`] | those below, at any depth of the text |
-//! | MCAP, chunks plain or compressed by zstd or lz4 | [`read_bag`] | `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`, `control_msgs/JointTrajectoryControllerState`, and messages that contain a `JointTrajectory` (CDR of either byte order, ROS 1) |
+//! | YAML, JSON, output of `ros2 topic echo` and `rostopic echo` | [`read_text`] | the types below, at any depth |
+//! | MCAP, chunks plain or compressed by zstd or lz4 | [`read_bag`] | the types below (CDR of either byte order, ROS 1) |
 //! | SQLite bags (`.db3`) | [`read_bag`] | the same in CDR |
 //! | folders of rosbag2 with `metadata.yaml` | [`read_bag`] | the same; also files compressed as a whole (`.zstd`) |
+//!
+//! Types: `trajectory_msgs/JointTrajectory`, `sensor_msgs/JointState`,
+//! `control_msgs/JointTrajectoryControllerState`, and messages that contain a `JointTrajectory`.
 //!
 //! All formats are converted to one tree of values ([`value`]): [`yaml`] builds it from text,
 //! [`cdr`] from bytes by the definition of the message ([`definition`]); [`message`] finds motions

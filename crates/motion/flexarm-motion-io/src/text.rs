@@ -6,7 +6,7 @@
 use flexarm_settings::{Finding, Setting};
 
 use crate::assemble::assemble;
-use crate::collect::Collector;
+use crate::collect::{Collector, Topic};
 use crate::error::{MotionError, PlacedProblem};
 use crate::value::{Node, Value};
 use crate::{MessageMotion, Request, yaml};
@@ -53,6 +53,15 @@ pub fn is_message_text(text: &str) -> bool {
 /// [`MotionError::Content`] with the line of the problem.
 pub fn read_text(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, MotionError> {
     read(text.trim_start_matches('\u{feff}'), origin, request).map_err(|trouble| trouble.of(origin))
+}
+
+/// Returns the type of the messages from which the motion of a text is.
+fn message_type(topic: &Topic) -> &'static str {
+    match (topic.received.is_empty(), topic.of) {
+        (false, _) => "trajectory_msgs/JointTrajectory",
+        (true, "position") => "sensor_msgs/JointState",
+        _ => "control_msgs/JointTrajectoryControllerState",
+    }
 }
 
 fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, PlacedProblem> {
@@ -105,11 +114,7 @@ fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion
     }
     let (topic, _) = collector.choose()?;
     let dropped = topic.foreign.clone();
-    let message = match (topic.received.is_empty(), topic.of) {
-        (false, _) => "trajectory_msgs/JointTrajectory",
-        (true, "position") => "sensor_msgs/JointState",
-        _ => "control_msgs/JointTrajectoryControllerState",
-    };
+    let message = message_type(&topic);
     let made = assemble(topic, origin, false)?;
     caveats.extend(made.caveats);
     let format = if text.trim_start().starts_with(['{', '[']) { "JSON message" } else { "YAML message" };

@@ -1,4 +1,7 @@
 //! Decompression up to a size limit, regardless of sizes stated in headers.
+//!
+//! Start at [`unpacked`] for bytes and [`inside_of`] for files. Not here: the containers (`mcap.rs`,
+//! `sqlite.rs`) and their messages.
 
 use std::io::{BufReader, Read};
 use std::path::Path;

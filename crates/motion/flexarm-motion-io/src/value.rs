@@ -1,4 +1,6 @@
 //! Messages as trees of values, from text or bytes.
+//!
+//! Start at [`Node`]. Not here: parsing (`yaml.rs`, `cdr.rs`), meaning (`message.rs`).
 
 use std::rc::Rc;
 

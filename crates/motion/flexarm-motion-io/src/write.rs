@@ -1,4 +1,7 @@
 //! Writes a motion as `trajectory_msgs/JointTrajectory`, in YAML or JSON.
+//!
+//! Start at [`write_joint_trajectory`]; rad or m, times from the start of the motion in s and ns.
+//! Not here: reading (`text.rs`), tables of samples (`flexarm-trajectory`).
 
 use std::fmt::Write;
 

@@ -1,4 +1,7 @@
 //! Parses YAML, of which JSON is a subset, into one tree for each document.
+//!
+//! Start at [`documents`]; lines and columns count from 1. Not here: the events of YAML
+//! (`flexarm-files`), the meaning of a message (`message.rs`).
 
 use std::borrow::Cow;
 use std::collections::HashMap;

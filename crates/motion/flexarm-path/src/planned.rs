@@ -1,4 +1,6 @@
 //! Results of planning: the motion and its moves.
+//!
+//! Plain data; rad or m, s. Not here: planning (`plan.rs`).
 
 use flexarm_settings::Place;
 use flexarm_trajectory::Trajectory;

@@ -1,4 +1,7 @@
 //! User's assignment of table columns to the time and the joints.
+//!
+//! Start at [`ColumnMap`]; columns count from 1. Not here: assignment by the names of the header
+//! (`table/layout.rs`).
 
 use std::str::FromStr;
 

@@ -1,4 +1,7 @@
 //! Gaps in sampled data: places where samples are missing.
+//!
+//! Start at [`gaps`]: a step of more than [`GAP`] usual steps, in evenly sampled data. Not here:
+//! interpolation across a gap (`spline.rs`).
 
 use flexarm_settings::Finding;
 

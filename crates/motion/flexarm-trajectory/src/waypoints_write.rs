@@ -1,4 +1,7 @@
 //! Writes a trajectory as a waypoint file that [`Trajectory::parse_toml`] reads.
+//!
+//! What was written is compared with the trajectory at many times before it is returned. Not here:
+//! samples (`csv_write.rs`), reading (`waypoints_toml.rs`).
 
 use std::fmt::Write;
 

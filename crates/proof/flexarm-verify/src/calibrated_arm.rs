@@ -106,6 +106,21 @@ impl Fitted {
     }
 }
 
+/// Claims of a fit: prediction against the tracker at the other poses, the share of their numbers
+/// within the stated uncertainty, and the residuals of the written file, which must be those reported.
+fn claims_of(case: &mut Case, fit: &Fitted) {
+    let truth = "laser tracker";
+    let [own, others] = fit.rms_mm();
+    let reported = 1e3 * 3f64.sqrt() * fit.found.residual.after;
+    let name = fit.name;
+    let distance = format!("{name}: distance at other poses [m]");
+    case.claim(distance, truth, 1e-3 * others, Bound::AtMost(1e-3 * UNSEEN_MM));
+    case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtLeast(COVERED[0]));
+    case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtMost(COVERED[1]));
+    let written = (own / reported - 1.0).abs();
+    case.claim(format!("{name}: written file against reported residuals"), "identity", written, Bound::AtMost(WRITTEN));
+}
+
 fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
     let mut case = Case::new(
         "calibrated-arm",
@@ -117,6 +132,7 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
          fit, which starts from the nominal robot; pose of the tracker and place of the reflector are found as well. The robot \
          file that the fit writes predicts the other poses.",
     );
+    // Distances from the tracker's places, of poses in the fit and of poses outside it.
     let heads = ["fitted", "numbers", "fitted poses", "other poses", "in their 95 % interval"];
     let mut table = Table::new("Root mean square of the distance from the measured place [mm].", &heads);
     for fit in all {
@@ -130,23 +146,10 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
         ]);
     }
     case.table(table);
-    let truth = "laser tracker";
     for fit in all {
-        let [own, others] = fit.rms_mm();
-        let reported = 1e3 * 3f64.sqrt() * fit.found.residual.after;
-        let name = fit.name;
-        let distance = format!("{name}: distance at other poses [m]");
-        case.claim(distance, truth, 1e-3 * others, Bound::AtMost(1e-3 * UNSEEN_MM));
-        case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtLeast(COVERED[0]));
-        case.claim(format!("{name}: share in its interval"), truth, fit.covered(), Bound::AtMost(COVERED[1]));
-        let written = (own / reported - 1.0).abs();
-        case.claim(
-            format!("{name}: written file against reported residuals"),
-            "identity",
-            written,
-            Bound::AtMost(WRITTEN),
-        );
+        claims_of(&mut case, fit);
     }
+    // Gears that carry little weight must be reported as not identifiable.
     if let Some(last) = all.last() {
         let of = |joint: usize| format!("drive.joint_{joint}.gearbox.stiffness");
         let is_identifiable =
@@ -154,6 +157,7 @@ fn page(all: &[Fitted], weight_torques: &[f64; 6]) -> Case {
         let count = (4..=6).filter(is_identifiable).count() as f64;
         case.claim("determined stiffnesses of joints 4 to 6, which carry little", "statics", count, Bound::AtMost(0.0));
     }
+    // The loads on the joints, which explain the small effect of the gears.
     let torques: Vec<String> = weight_torques.iter().map(|torque| format!("{torque:.1}")).collect();
     let [before, after] = [&all[0], &all[1]].map(|fit| fit.rms_mm()[1]);
     case.text(format!(

@@ -1,4 +1,6 @@
 //! Compliance of a point by every method, compared with a truth; shared by the first three cases.
+//!
+//! Start at [`by_every_method`]: 6x6, linear first, world axes. Not here: the truths (each case).
 
 use flexarm::{Modelling, Robot};
 use nalgebra::{Matrix6, Vector6};

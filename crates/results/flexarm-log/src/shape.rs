@@ -1,4 +1,6 @@
 //! Sizes of a sample as given by the header, and the check of a sample.
+//!
+//! Start at [`Shape::of`]. Not here: names and order of columns (`table.rs`).
 
 use std::path::Path;
 

@@ -1,4 +1,7 @@
 //! Errors of robot descriptions.
+//!
+//! Faults of the content are findings with a place; all are reported together. Not here: their texts
+//! (the checks).
 
 use std::path::PathBuf;
 

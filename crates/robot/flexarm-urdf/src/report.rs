@@ -1,4 +1,6 @@
 //! Collects the findings of the checks, so that all faults are reported together.
+//!
+//! Start at [`Report`]; findings are in the order of the file. Not here: the checks (`lint`).
 
 use flexarm_settings::{Finding, Place, Severity};
 

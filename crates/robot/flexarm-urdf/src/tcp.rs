@@ -1,4 +1,6 @@
 //! Choice of the tool link if the user does not give one.
+//!
+//! Start at [`default_tcp`]. Not here: a tool frame given by the user (`flexarm-run`).
 
 use std::collections::{HashMap, HashSet};
 

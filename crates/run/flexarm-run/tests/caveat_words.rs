@@ -1,4 +1,4 @@
-//! What caveats say.
+//! Words of caveats: the likely slip of a number outside its range, efforts, sampling.
 
 use flexarm_run::caveat::slip::{ANGLE, DENSITY, INERTIA, LENGTH, MODULUS, slip};
 use flexarm_run::internals::{EFFORT, FEW_SAMPLES};

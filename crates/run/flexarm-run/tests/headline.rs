@@ -113,7 +113,7 @@ fn a_robot_with_nothing_that_bends_says_so_first_and_how_to_give_it_something() 
     let (summary, _) = run_as(&load("kr210"), "point_to_point.toml", &modelling, &RunOptions::default());
     let line = &summary.headline;
     assert!(line.starts_with("nothing is flexible") && line.contains("as chosen") && !line.contains("[["), "{line}");
-    // Without the rigid twin there is nothing to compare with; what bends is said all the same.
+    // Without the rigid twin there is no comparison; the headline still names the flexible links.
     let options = RunOptions { with_twin: false, ..RunOptions::default() };
     let (summary, _) = run(&load("kr210/links.toml"), "point_to_point.toml", &options);
     assert_eq!(summary.headline, "flexible: links link_2, link_3; not compared with the rigid robot");

@@ -86,7 +86,7 @@ fn warnings_about_motion_files_have_their_line_and_a_code_for_each_kind() {
         let found = found.unwrap_or_else(|| panic!("{code} at {location} is not in {caveats:#?}"));
         assert!(found.message.starts_with(&format!("{location}: ")), "{found:?}");
     }
-    // Where the whole curve of a joint is meant, the joint is named.
+    // A caveat about the whole curve of a joint names the joint.
     let path = folder.join("start.csv");
     std::fs::write(&path, "time,joint_1\n0,0\n1,0.5\n2,1\n").unwrap();
     let caveats = Motion::load(&path, &robot).unwrap().caveats();

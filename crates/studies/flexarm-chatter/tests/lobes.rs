@@ -333,7 +333,7 @@ fn a_feed_per_tooth_that_no_cutter_takes_is_told_along_a_motion() {
     // 250 mm/s at 8000/min with three teeth: 0.63 mm; at 400/min 12.5 mm.
     assert_eq!(told(8000.0), None);
     let (feed, likely) = told(400.0).unwrap();
-    println!("{feed} m a tooth, {likely}");
+    eprintln!("{feed} m a tooth, {likely}");
     assert!((feed / 12.5e-3 - 1.0).abs() < 0.01 && likely.contains("mm/min"), "{feed} {likely}");
 }
 

@@ -320,6 +320,20 @@ impl<'a> Job<'a> {
         }
     }
 
+    /// Returns the commands of the unchanged motion, whose error is given.
+    fn unchanged(&self, inversion: &Inversion, error: &DMatrix<f64>) -> Commands {
+        Commands {
+            motion: self.motion.clone(),
+            change: DMatrix::zeros(self.q.nrows(), self.q.ncols()),
+            peaks: vec![peak(error)],
+            kept: 0,
+            cutoff_hz: Some(inversion.cutoff_hz()),
+            fewest: inversion.fewest_directions(),
+            quicker: 0.0,
+            discarded: Vec::new(),
+        }
+    }
+
     /// Corrects the commands by the inverse of the arm until the error settles. An iteration that
     /// increases the RMS or the largest error by more than a factor of 1/[`SETTLED`] is discarded,
     /// and the next one corrects up to half the frequency.
@@ -335,16 +349,7 @@ impl<'a> Job<'a> {
         let mut beyond = self.samples_beyond(&inversion);
         let mut whole = self.error(&DMatrix::zeros(m, N), beyond)?;
         let mut error = within(&whole);
-        let mut best = Commands {
-            motion: self.motion.clone(),
-            change: DMatrix::zeros(m, N),
-            peaks: vec![peak(&error)],
-            kept: 0,
-            cutoff_hz: Some(inversion.cutoff_hz()),
-            fewest: inversion.fewest_directions(),
-            quicker: 0.0,
-            discarded: Vec::new(),
-        };
+        let mut best = self.unchanged(&inversion, &error);
         let first = size(&error);
         let mut least = first;
         let most = if first[0] > 0.0 { self.request.iterations } else { 0 };

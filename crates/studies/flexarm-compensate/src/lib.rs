@@ -345,13 +345,13 @@ fn attempt(
     Ok((answer, MotionPair { scenario, motion }, own))
 }
 
-/// Checks the request against motion and arm: numbers in their ranges, joints, something that yields.
-fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Result<(), CompensateError> {
-    let value = |what: &str, found: f64, expected: &str| {
-        CompensateError::Input(format!("{what} is {found}, expected {expected}"))
-    };
-    // Components, cutoff, step and duration.
-    let motion = &scenario.motion;
+/// Returns the error for a number outside its range.
+fn value(what: &str, found: f64, expected: &str) -> CompensateError {
+    CompensateError::Input(format!("{what} is {found}, expected {expected}"))
+}
+
+/// Checks components, cutoff, step, duration and number of iterations.
+fn check_numbers(motion: &Motion, request: &CompensateRequest) -> Result<(), CompensateError> {
     if !request.components.contains(&true) {
         return Err(CompensateError::Input(
             "no TCP component is selected: select at least one of x, y, z, rx, ry, rz".into(),
@@ -380,6 +380,12 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Re
         let found = request.iterations as f64;
         return Err(value("the number of iterations", found, "at most 100"));
     }
+    Ok(())
+}
+
+/// Checks the request against motion and arm: numbers in their ranges, joints, at least one elastic element.
+fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Result<(), CompensateError> {
+    check_numbers(&scenario.motion, request)?;
     // Limits and payloads, and an arm that deflects at all.
     let (found, expected) = (request.accelerations.len(), arm.joints().count());
     if found != 0 && found != expected {
@@ -404,7 +410,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Re
         return Err(CompensateError::nothing_yields());
     }
     // Static equilibria do not depend on velocities, so the static method accepts velocity jumps.
-    match motion.trajectory.velocity_jumps().first() {
+    match scenario.motion.trajectory.velocity_jumps().first() {
         Some(jump) if request.method == Method::Dynamic => Err(CompensateError::Input(format!(
             "the velocity jumps at {t_s} s, which the dynamic method cannot correct: start and end the motion at \
              rest and blend its corners, or use the static method",

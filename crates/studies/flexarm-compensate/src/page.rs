@@ -37,7 +37,7 @@ pub(super) fn html(answer: &Compensation) -> String {
     if answer.plants.iter().any(|plant| plant.after.rms_m > plant.before.rms_m) {
         page += "<p>If the error increases, the commands correct a deflection that this plant does not have.</p>\n";
     }
-    // What the commands ask of the joints.
+    // Maximum change of the command of each joint.
     page += "<h2>Maximum change of each joint</h2>\n<table><tr><th>joint</th><th>rad or m</th><th>deg</th></tr>\n";
     for change in &answer.changes {
         let _ = writeln!(

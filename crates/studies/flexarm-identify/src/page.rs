@@ -25,7 +25,7 @@ pub(super) fn html(answer: &Identification) -> String {
     page += &headline(answer);
     page += &warnings("", &answer.caveats.iter().map(|caveat| caveat.message.clone()).collect::<Vec<_>>());
     page += &parameters(answer);
-    // What the fit found beside the parameters.
+    // Poses of the instruments and positions of the targets, if fitted.
     if !(answer.instruments.is_empty() && answer.targets.is_empty()) {
         page += "<h2>Instruments and targets</h2>\n";
     }

@@ -229,16 +229,10 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
     }
     let request = &request;
     // Candidates, and the readings whose uncertainty the plan minimises.
-    let reading = |q: &Vec<f64>, setup: &Setup| displacement(q, setup, request.std_m);
     let pairs = allowed(&efforts, poses.len(), &request.setups(), if chosen_forces { 0 } else { request.count });
-    let candidates: Vec<Reading> = pairs.iter().map(|(pose, setup)| reading(&poses[*pose], setup)).collect();
-    let purpose: Vec<Reading> = match &request.work {
-        Some(path) => {
-            let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
-            poses_of(path, &joints)?.iter().map(|q| reading(q, &work)).collect()
-        }
-        None => Vec::new(),
-    };
+    let candidates: Vec<Reading> =
+        pairs.iter().map(|(pose, setup)| displacement(&poses[*pose], setup, request.std_m)).collect();
+    let purpose = work_readings(request, &joints)?;
     // The choice, with what it demands of the drives.
     let nominal = nominal(&arm);
     let options = PlanOptions { count: request.count, purpose };
@@ -265,6 +259,14 @@ pub fn plan_measurements(robot: &Robot, request: &PlanRequest) -> Result<Measure
         (answer.file, answer.table) = (Some(file.display().to_string()), Some(table.display().to_string()));
     }
     Ok(answer)
+}
+
+/// Returns the displacements of the TCP at the poses of the work under the first force; none without
+/// such poses.
+fn work_readings(request: &PlanRequest, joints: &[String]) -> Result<Vec<Reading>, Error> {
+    let Some(path) = &request.work else { return Ok(Vec::new()) };
+    let work = Setup { force: request.forces[0], at: [0.0; 3], point: [0.0; 3], direction: None };
+    Ok(poses_of(path, joints)?.iter().map(|q| displacement(q, &work, request.std_m)).collect())
 }
 
 /// Returns the poses and setups whose loads the drives can hold, if there are `least` of them above 0;

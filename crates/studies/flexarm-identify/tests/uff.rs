@@ -59,7 +59,7 @@ fn a_function_is_the_same_as_text_and_in_both_orders_of_bytes() {
     }
 }
 
-/// What is wrong has the line of the file: of the form, of a word, or of the end.
+/// An error names the line of the form, of the word, or of the end of the file.
 #[test]
 fn a_broken_file_is_refused_with_its_line() {
     let head = "58b     1     2          11            96     0     0           0           0";

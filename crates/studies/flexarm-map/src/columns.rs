@@ -99,24 +99,7 @@ impl Layout {
             columns.extend(displacement("error", meaning));
             columns.push(less("load_m", "displacement of the TCP due to the load"));
         }
-        // Compliance: along the axes, coupling between them, worst direction; the matrix of listed poses.
-        for (axis, name) in ["compliance_x_m_per_n", "compliance_y_m_per_n", "compliance_z_m_per_n"].iter().enumerate()
-        {
-            columns.push(less(name, &format!("displacement along {} per force along it", ["x", "y", "z"][axis])));
-        }
-        for pair in ["xy", "xz", "yz"] {
-            let (along, by) = pair.split_at(1);
-            let meaning = format!("displacement along {along} per force along {by}, averaged with its transpose");
-            columns.push(place(&format!("compliance_{pair}_m_per_n"), &meaning));
-        }
-        columns.push(less("compliance_worst_m_per_n", "maximum displacement per force over all directions"));
-        for name in ["worst_x", "worst_y", "worst_z"] {
-            columns.push(place(name, "direction of that force, world axes"));
-        }
-        columns.push(less("rotation_worst_rad_per_nm", "maximum rotation per moment over all directions"));
-        if matrix {
-            columns.extend(full_compliance());
-        }
+        columns.extend(compliance(matrix));
         // Frequencies, limit of a cutting tool, shares of the elements.
         for k in 1..=frequencies {
             let column = less(&format!("frequency_{k}_hz"), "undamped natural frequency under gravity, drives locked");
@@ -168,6 +151,29 @@ fn place(name: &str, meaning: &str) -> MapColumn {
 
 fn less(name: &str, meaning: &str) -> MapColumn {
     MapColumn { quantity: true, ..place(name, meaning) }
+}
+
+/// Columns of the compliance: along the axes, coupling between them, worst direction; with `matrix`
+/// all entries.
+fn compliance(matrix: bool) -> Vec<MapColumn> {
+    let mut columns = Vec::new();
+    for (axis, name) in ["compliance_x_m_per_n", "compliance_y_m_per_n", "compliance_z_m_per_n"].iter().enumerate() {
+        columns.push(less(name, &format!("displacement along {} per force along it", ["x", "y", "z"][axis])));
+    }
+    for pair in ["xy", "xz", "yz"] {
+        let (along, by) = pair.split_at(1);
+        let meaning = format!("displacement along {along} per force along {by}, averaged with its transpose");
+        columns.push(place(&format!("compliance_{pair}_m_per_n"), &meaning));
+    }
+    columns.push(less("compliance_worst_m_per_n", "maximum displacement per force over all directions"));
+    for name in ["worst_x", "worst_y", "worst_z"] {
+        columns.push(place(name, "direction of that force, world axes"));
+    }
+    columns.push(less("rotation_worst_rad_per_nm", "maximum rotation per moment over all directions"));
+    if matrix {
+        columns.extend(full_compliance());
+    }
+    columns
 }
 
 /// Columns of the 6×6 compliance, row by row: displacement and rotation per force and moment.

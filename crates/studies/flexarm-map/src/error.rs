@@ -1,4 +1,6 @@
 //! Errors of a map: a request without a result, or an interruption, as errors of a run.
+//!
+//! Texts name the request's value and the remedy. Not here: errors of robot and pose (`flexarm-run`).
 
 use std::path::PathBuf;
 

@@ -255,14 +255,8 @@ pub fn map(
     let layout = Layout::new(at.plant(), &joints, loaded, frequencies, request.tool.as_ref(), listed);
     let by = layout.compared_by(request.by.as_deref())?;
     let near = home(model, request.at.as_deref())?;
-    if let Some(tool) = &request.tool
-        && let Err(error) = lowest_limit(robot, &request.modelling, tool, &near, &|| true)
-        && error.external::<LobesError>().is_some()
-    {
-        // Errors of tool or robot are the same at all poses.
-        return Err(error);
-    }
-    // What is computed at each pose, and which poses are kept.
+    check_tool(robot, request, &near)?;
+    // Quantities at each pose, and the choice of the poses kept.
     let cut = request.tool.as_ref().map(|tool| Cut { robot, modelling: &request.modelling, tool });
     let evaluator = Evaluator::new(at, &layout, request.wrench, cut);
     let choice = Choice { layout: &layout, keep: request.keep, by };
@@ -287,12 +281,7 @@ pub fn map(
     found.caveats.extend(caveats);
     found.caveats.extend(one_place(&found));
     found.caveats.extend((done < all).then(|| unfinished(done, all)));
-    if let Some(tool) = &request.tool {
-        found.caveats.extend(flexarm_chatter::tool_caveats(tool, tool.deepest));
-        if let MapRegion::Along { motion, .. } = &request.region {
-            found.caveats.extend(flexarm_chatter::feed_caveat(robot, tool, motion)?);
-        }
-    }
+    found.caveats.extend(tool_caveats(robot, request)?);
     found.caveats.extend(caveat::validity::outside_limits(actuated, &near).filter(|_| request.at.is_some()));
     found.caveats.extend(validity(robot, request, &found));
     found.warnings = caveat::warnings(&found.caveats);
@@ -304,6 +293,25 @@ pub fn map(
         true => Err(stopped(request.output.clone()).into()),
         false => Ok(found),
     }
+}
+
+/// Checks the cutting tool at one pose: errors of tool or robot are the same at all poses.
+fn check_tool(robot: &Robot, request: &MapRequest, q: &[f64]) -> Result<(), Error> {
+    let Some(tool) = &request.tool else { return Ok(()) };
+    match lowest_limit(robot, &request.modelling, tool, q, &|| true) {
+        Err(error) if error.external::<LobesError>().is_some() => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the caveats of the cutting tool, along a motion with that of its feed.
+fn tool_caveats(robot: &Robot, request: &MapRequest) -> Result<Vec<Finding>, Error> {
+    let Some(tool) = &request.tool else { return Ok(Vec::new()) };
+    let mut caveats = flexarm_chatter::tool_caveats(tool, tool.deepest);
+    if let MapRegion::Along { motion, .. } = &request.region {
+        caveats.extend(flexarm_chatter::feed_caveat(robot, tool, motion)?);
+    }
+    Ok(caveats)
 }
 
 /// Returns the positions of the joints not varied: as given, or zero clamped to the limits.

@@ -222,7 +222,7 @@ fn by_default_no_place_of_a_workspace_is_inside_the_column_of_the_arm() {
             .fold(f64::INFINITY, f64::min)
     };
     let usual = nearest(WorkspaceGrid { spacing_m: Some(0.3), ..WorkspaceGrid::default() });
-    println!("nearest place {usual:.3} m");
+    eprintln!("nearest place {usual:.3} m");
     assert!((0.3..1.2).contains(&usual), "{usual}");
     let all = WorkspaceGrid { spacing_m: Some(0.3), keep_out_m: Some(0.0), ..WorkspaceGrid::default() };
     assert!(nearest(all) < 0.3);

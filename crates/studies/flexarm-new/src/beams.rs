@@ -192,15 +192,22 @@ fn between(link: &Candidate<'_>, [from, to]: [Vector3<f64>; 2]) -> Result<BeamSe
         return Err(format!("only {:.0} % of its mass is between the joints", 100.0 * own / whole).into());
     }
     section.wall_of_half = section.wall.and_then(|_| wall_for(&outlines, shape, 0.5 * inertia.mass / density));
-    // Axes and offset of the section in link axes.
+    place(&mut section, &cuts, length, turn);
+    section.open = cuts.open();
+    Ok(section)
+}
+
+/// Sets the axes and the offset of a section in link axes; an offset below 3 % of its smaller outer
+/// size counts as zero.
+///
+/// * `turn`: angle of its principal axes about x of S (rad).
+fn place(section: &mut BeamSection, cuts: &Cuts, length: f64, turn: f64) {
     let R_LS = cuts.X_LS.rotation * Rotation3::from_axis_angle(&Vector3::x_axis(), turn);
     section.y_axis = (R_LS * Vector3::y()).into();
     let c = cuts.centroid(length);
     let offset = cuts.X_LS.rotation * Vector3::new(0.0, c.x, c.y);
     let matters = offset.norm() > 0.03 * section.width.min(section.height);
     section.offset = if matters { offset.into() } else { [0.0; 3] };
-    section.open = cuts.open();
-    Ok(section)
 }
 
 /// Outlines of a link across the line to its distal joint.

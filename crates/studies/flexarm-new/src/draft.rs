@@ -97,15 +97,7 @@ impl Draft {
         let bare = model(None)?;
         let moving_mass = mass_after(mechanism, &chain);
         if moving_mass <= 0.0 {
-            let links = mechanism.links.iter().filter(|l| l.inertia.is_none_or(|i| i.mass <= 0.0)).count();
-            let message = format!(
-                "no link of the arm has a mass in this file ({links} links without <inertial>): without mass there \
-                 are no loads and no deflections. Give the mass of the arm from its data sheet with {} KG: it is \
-                 distributed over the links by the volume of their meshes; or a density with {} KG_PER_M3",
-                Setting::InertiaFromTotalMass,
-                Setting::InertiaFromDensity
-            );
-            return Err(NewError(message).into());
+            return Err(massless(mechanism).into());
         }
         // Payload, as given or guessed from the loads over the workspace.
         let held = fixed_joints(mechanism, &chain);
@@ -151,6 +143,18 @@ impl Draft {
     pub(crate) fn beams_with_sections(&self) -> Vec<&DraftLink> {
         self.links.iter().filter(|link| link.section.is_ok()).collect()
     }
+}
+
+/// Returns the error for an arm without mass, with the settings that supply one.
+fn massless(mechanism: &Mechanism) -> NewError {
+    let links = mechanism.links.iter().filter(|l| l.inertia.is_none_or(|i| i.mass <= 0.0)).count();
+    NewError(format!(
+        "no link of the arm has a mass in this file ({links} links without <inertial>): without mass there \
+         are no loads and no deflections. Give the mass of the arm from its data sheet with {} KG: it is \
+         distributed over the links by the volume of their meshes; or a density with {} KG_PER_M3",
+        Setting::InertiaFromTotalMass,
+        Setting::InertiaFromDensity
+    ))
 }
 
 /// The description as read, with the links whose inertia is doubtful.

@@ -162,7 +162,7 @@ fn masses(draft: &Draft, list: &mut Vec<Assumption>) {
 
 /// Lists the questions for the manufacturer, or quantities to measure.
 fn questions(draft: &Draft) -> Vec<String> {
-    // What decides the stiffness, then loads and limits.
+    // Quantities that decide the stiffness, then loads and limits.
     let mut list = Vec::new();
     let turning: Vec<&str> = draft.joints.iter().filter(|j| j.gear.is_some()).map(|j| j.joint.name.as_str()).collect();
     if !turning.is_empty() {

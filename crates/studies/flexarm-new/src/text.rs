@@ -383,7 +383,7 @@ fn write_readme(t: &mut String, draft: &Draft, placed: &Placed) -> std::fmt::Res
          flexarm check .              # errors and doubtful values"
     )?;
     writeln!(t, "flexarm motion motion.toml . # the motion against the limits\n```\n\n## Found\n")?;
-    // What is found in the description: chain, joints, links, mass, fixed joints.
+    // Contents of the description: chain, joints, links, mass, fixed joints.
     writeln!(
         t,
         "* The arm starts at {} and ends at the tool {}, at most {:.2} m from its first joint in the poses that \

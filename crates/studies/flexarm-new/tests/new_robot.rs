@@ -158,7 +158,7 @@ fn an_arm_of_known_sections_is_found_with_its_sections_and_is_clean() {
     let mut sizes = [upper.width.unwrap(), upper.height.unwrap()];
     sizes.sort_by(f64::total_cmp);
     let errors = [sizes[0] / w - 1.0, sizes[1] / h - 1.0, upper.wall.unwrap() / wall - 1.0];
-    println!("upper arm: width, height, wall off by {errors:?}, bound 1e-3");
+    eprintln!("upper arm: width, height, wall off by {errors:?}, bound 1e-3");
     assert!(errors.iter().all(|e| e.abs() < 1e-3), "{errors:?}");
     assert!(upper.assumed && upper.material == Some("aluminium"));
     let robot = Robot::load(&made.robot).unwrap();
@@ -180,7 +180,7 @@ fn the_torque_of_weight_is_that_of_the_stretched_arm() {
     let made = made(&folder, &ARM.urdf(""), &options);
     let truth = 9.81 * (upper_mass() * 0.4 + 6.0 * 1.1 + 10.0 * 1.4);
     let found = made.joints[1].weight_torque;
-    println!("a2: {found:.2} N m over the poses, {truth:.2} N m stretched");
+    eprintln!("a2: {found:.2} N m over the poses, {truth:.2} N m stretched");
     assert!(found <= truth * (1.0 + 1e-9) && found > 0.97 * truth);
     assert!(!made.payload.assumed && made.payload.mass == 10.0);
     assert!(made.joints[1].effort_fault.is_none());
@@ -314,7 +314,7 @@ fn one_mass_for_all_links_is_told_and_a_total_mass_is_spread_by_volume_or_length
         for (k, length) in lengths.iter().enumerate() {
             let mass = robot.urdf.mechanism.link(&format!("l{k}")).unwrap().inertia.unwrap().mass;
             let error = mass / (34.0 * length / all) - 1.0;
-            println!("link {k}, shapes {shapes}: mass off by {error:.1e}, bound 1e-9");
+            eprintln!("link {k}, shapes {shapes}: mass off by {error:.1e}, bound 1e-9");
             assert!(error.abs() < 1e-9, "link {k}: {error:.1e}");
         }
     }
@@ -374,7 +374,7 @@ fn a_link_whose_frames_sit_at_its_far_end_bends_as_the_same_link_with_frames_at_
         from[0] + length,
         to[0],
     ];
-    println!("width, height, wall, length, ends off by {errors:?}, bound 1e-3");
+    eprintln!("width, height, wall, length, ends off by {errors:?}, bound 1e-3");
     assert!(errors.iter().all(|e| e.abs() < 1e-3), "{errors:?} {upper:?}");
     let robot = Robot::load(&made.robot).unwrap();
     assert!(robot.flexible_links.iter().any(|link| link.flexible.link == "upper"));

@@ -66,6 +66,24 @@ impl Column {
     }
 }
 
+/// Returns an error with the place of an entry.
+fn fail(place: &RobotFileError, message: String) -> RobotFileError {
+    RobotFileError { message, ..place.clone() }
+}
+
+/// Checks that the names are different, and free in the table of runs.
+fn check_names(columns: &[Column]) -> Result<(), RobotFileError> {
+    for (k, column) in columns.iter().enumerate() {
+        let taken = columns[..k].iter().any(|other| other.name == column.name);
+        if taken || ["run", "status", "reason", CAVEATS].contains(&column.name.as_str()) {
+            let message =
+                format!("the name {:?} is taken: give the parameter another one with name = \"...\"", column.name);
+            return Err(fail(&column.place, message));
+        }
+    }
+    Ok(())
+}
+
 impl Design {
     /// Builds the design from the columns of a study.
     ///
@@ -73,16 +91,7 @@ impl Design {
     /// With the place in the study: linked parameters with different numbers of values, too many
     /// runs or random parameters, duplicate names.
     pub(super) fn new(columns: Vec<Column>, file: &StudyFile) -> Result<Self, RobotFileError> {
-        let fail = |place: &RobotFileError, message: String| RobotFileError { message, ..place.clone() };
-        // Names are those of columns in the table of runs.
-        for (k, column) in columns.iter().enumerate() {
-            let taken = columns[..k].iter().any(|other| other.name == column.name);
-            if taken || ["run", "status", "reason", CAVEATS].contains(&column.name.as_str()) {
-                let message =
-                    format!("the name {:?} is taken: give the parameter another one with name = \"...\"", column.name);
-                return Err(fail(&column.place, message));
-            }
-        }
+        check_names(&columns)?;
         // Directions of the grid: one per listed parameter or linked group, all of one size.
         let (mut sizes, mut directions, mut drawn) = (Vec::new(), Vec::<Vec<usize>>::new(), Vec::new());
         for (k, column) in columns.iter().enumerate() {

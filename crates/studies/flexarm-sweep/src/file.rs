@@ -175,7 +175,7 @@ pub(super) fn read(path: &Path) -> Result<StudyFile, Error> {
     }
     let drawn = parameters.iter().any(|p| matches!(p.values, Values::Spread(_) | Values::Choice(_)));
     let (method, count, seed, sample_place) = sample(file.sample.as_ref(), drawn, &source)?;
-    // What is checked against the robot later keeps its place in the file.
+    // Entries that are checked against the robot later keep their place in the file.
     let options = file.options.iter().map(|(key, value)| option(key, value, &source)).collect::<Result<_, _>>()?;
     let reduce =
         file.reduce.iter().map(|(link, job)| (link.clone(), folder.join(job.get_ref()), source.error(job.span(), "")));
@@ -296,7 +296,7 @@ fn parameter(entry: &Spanned<ParameterToml>, source: &Source) -> Result<Paramete
             "{label:?} is a label that no result depends on; vary a number of the robot or the run"
         )));
     }
-    // What the values do to those in the files, and which values there are.
+    // Effect of the values on those in the files, and the values themselves.
     let roles = [("value", Role::Value), ("factor", Role::Factor), ("offset", Role::Offset)];
     let role = word(source, "as", &own.role, &roles)?.1;
     let values = values(own, source, &fail)?;

@@ -1,4 +1,7 @@
 //! Force law interpolated between points: cubics for the tension T(x), quartics for the energy U(x).
+//!
+//! Start at [`BalancerCurve::new`]; x is the length or angle of the balancer (m, rad), T in N or N m,
+//! U in J with `T = dU/dx`. Not here: gas and linear springs (`law.rs`), the length x (`lengths.rs`).
 
 /// Interpolated tension: piecewise cubics with continuous slope and no overshoot between data
 /// points [Fritsch & Butland 1984]; linear extrapolation beyond the first and last point.

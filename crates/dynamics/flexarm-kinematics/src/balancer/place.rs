@@ -1,4 +1,8 @@
-//! Placement of the balancers of a mechanism on the bodies of the tree: names become bodies, points and coordinates.
+//! Placement of the balancers of a mechanism on the bodies of the tree: names become bodies, points
+//! and coordinates.
+//!
+//! Points are `p_BoP_B`, of a point P in the axes of its body B (m); over a joint x is
+//! `Σ c_i q_i + x_0`. Not here: force and energy of the law (`law.rs`, `forces.rs`).
 
 use std::collections::HashSet;
 

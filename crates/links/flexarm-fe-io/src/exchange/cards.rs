@@ -1,4 +1,7 @@
 //! Nastran bulk data: joins physical lines in small, large or free field into entries.
+//!
+//! Start at [`cards`]: `$` begins a comment; `*`, `+` or a blank keyword a continuation. Lines count from 1, fields
+//! from 0. Not here: the meaning of the fields (`dmig.rs`).
 
 use super::position::ErrorPosition;
 use super::text::Text;

@@ -1,4 +1,7 @@
 //! Diagnosis of substructure files that are well formed but wrong, with the cause.
+//!
+//! Start at [`diagnose_substructure`]; six rows per interface, linear first. Not here: the checks of
+//! every stiffness (`flexarm_fem::gate`).
 
 use nalgebra::DMatrix;
 

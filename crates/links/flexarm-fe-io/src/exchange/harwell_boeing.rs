@@ -1,4 +1,7 @@
 //! Harwell-Boeing as written by ANSYS `HBMAT`: `RSA` (lower triangle by columns) and `RUA`.
+//!
+//! Start at [`parse`]; indices count from 1 in the file. Not here: labels of the rows in a `.mapping`
+//! file (`abaqus_text.rs`), other formats (`recognise.rs`).
 
 use super::fortran::{Format, parse_format};
 use super::matrix::{LabelledMatrix, Storage, Triplets};

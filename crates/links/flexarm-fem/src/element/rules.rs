@@ -124,6 +124,7 @@ impl Table {
             shape_functions(kind, *xi, &mut N, &mut dN);
             table.xi.push(*xi);
             table.weight.push(*weight);
+            // N_i, then dN_i/dξ_c by c, then N_i N_j for j ≥ i.
             table.N.extend(&N[..n]);
             for c in 0..3 {
                 table.dN.extend(dN[..n].iter().map(|d| d[c]));
@@ -181,6 +182,7 @@ pub(crate) const TET10_DISTORTIONS: [f64; 5] = [0.005, 0.07, 0.12, 0.2, 0.35];
 
 impl Tables {
     fn new(kind: ElementKind) -> Self {
+        // Rules by rising distortion of the element; for `calculix` the one of that program.
         let (stiffness, mass, calculix) = match kind {
             ElementKind::Tet4 => (vec![tet(TetRule::P1)], vec![tet(TetRule::P4)], tet(TetRule::P1)),
             ElementKind::Tet10 => {

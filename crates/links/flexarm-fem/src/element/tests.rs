@@ -1,4 +1,8 @@
 //! Elements against closed forms, integrals with matrices, finer rules and rigid motions.
+//!
+//! Each kind is tested on straight and on distorted elements. Truths: partition of unity, central
+//! differences, six rigid motions without force, constant strain, volume, `∫ Bᵀ D B`. SI units.
+//! Not here: assembled meshes (`model`), stress (`stress/tests.rs`).
 
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix6, Vector3};
 

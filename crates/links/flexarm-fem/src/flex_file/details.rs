@@ -138,6 +138,7 @@ fn read_superelement(
 ) -> Result<Superelement, FlexFileError> {
     let table = node.table()?;
     table.only(&["interfaces", "stiffness", "mass"])?;
+    // Interfaces, A and B first, with their frames and ties.
     let mut interfaces = Vec::new();
     let list = table.require("interfaces", "the interfaces, proximal first")?;
     for item in list.list()? {
@@ -156,12 +157,14 @@ fn read_superelement(
         let found = format!("{} interface(s)", interfaces.len());
         return Err(list.fail(FlexErrorKind::WrongSize, found, "two or more", "A and B first"));
     }
+    // Stiffness and mass of equal size, 6 rows per interface and one per mode.
     let K = read_dense(&table, "stiffness", 6 * interfaces.len())?;
     let M = read_dense(&table, "mass", 6 * interfaces.len())?;
     if K.nrows() != M.nrows() {
         let found = format!("{} rows of stiffness, {} of mass", K.nrows(), M.nrows());
         return Err(node.fail(FlexErrorKind::WrongSize, found, "as many of both", "is the file cut off?"));
     }
+    // Diagonal entries are not negative; a_ij = a_ji relative to sqrt(a_ii a_jj).
     for (key, A) in [("stiffness", &K), ("mass", &M)] {
         if let Some(found) = A.diagonal().iter().find(|a| !(**a >= 0.0)) {
             let expected = format!("a {key} without negative diagonal entries");
@@ -221,6 +224,7 @@ fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<
     let table = node.table()?;
     table.only(&["joint", "part"])?;
     let (mut joints, mut parts) = (Vec::new(), Vec::new());
+    // Joints: frame and stiffness at S.
     for item in table.require("joint", "one [[chain.joint]] between two parts")?.list()? {
         let joint = item.table()?;
         let X_LS = read_pose(&joint, units, &["stiffness"])?;
@@ -235,6 +239,7 @@ fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<
             check_matrix6("K_S", &K, &GateLimits::default()).map_err(|cause| item.refused(cause, expected))?;
         joints.push(ElasticSplit { X_LS, K_S });
     }
+    // Rigid parts, one more than joints.
     for item in table.require("part", "one [[chain.part]] per rigid part")?.list()? {
         let part = item.table()?;
         part.only(&["mass", "com", "inertia"])?;

@@ -1,4 +1,6 @@
 //! Errors in the text of a reduced-link file, with their position.
+//!
+//! Lines and columns count from 1. Start at [`FlexFileError`]. Not here: reading (`read.rs`).
 
 use flexarm_settings::Place;
 

@@ -1,4 +1,7 @@
 //! Frames of a reduced-link file, written and read: `[interface.A]`, `[interface.B]`, `[split]`.
+//!
+//! `X_LA`, `X_LB`, `X_LS`: translation in the unit of length, `rpy` in rad or a rotation matrix by
+//! rows. Not here: stiffness and masses (`read.rs`, `write.rs`).
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};

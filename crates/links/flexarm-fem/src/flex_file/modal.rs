@@ -39,6 +39,7 @@ pub(super) fn write_modal(modal: &ModalLink) -> String {
     let mut text = String::from(
         "\n[modal]                       # shapes with A held: six per interface, then modes; link axes\n",
     );
+    // Coordinates and interfaces; shapes only where they are not those of Craig and Bampton.
     text += "coordinates = [\n";
     for label in &modal.labels {
         text += &format!("  {},\n", quoted(label));
@@ -53,6 +54,7 @@ pub(super) fn write_modal(modal: &ModalLink) -> String {
         let rows = modal.interfaces.iter().flat_map(|i| i.Phi.row_iter().map(|row| numbers(row.iter())));
         text += &list("shapes", rows);
     }
+    // Integrals of zeroth to second order over the mass, then stiffness and mass.
     let J = &modal.inertia;
     text += &format!("mass = {:?}\nfirst_moment = {}\n", modal.mass, numbers(modal.first_moment.iter()));
     let moments = [J[(0, 0)], J[(1, 1)], J[(2, 2)], J[(0, 1)], J[(0, 2)], J[(1, 2)]];
@@ -65,6 +67,7 @@ pub(super) fn write_modal(modal: &ModalLink) -> String {
         text += &list("N", pairs.map(|at| nine(&modal.N[at])));
     }
     text += &format!("K = {}\nM = {}\n", triangle(&modal.K), triangle(&modal.M));
+    // Geometric stiffness per unit acceleration, angular acceleration, product of speeds, load.
     if let Some(G) = &modal.geometric {
         text += "\n[modal.geometric]             # per unit load\n";
         text += &list("acceleration", G.acceleration.iter().map(triangle));

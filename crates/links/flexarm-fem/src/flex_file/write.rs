@@ -1,4 +1,7 @@
 //! Writes a [`ReducedLink`] as text that reads back to bitwise equal numbers.
+//!
+//! Start at [`write_flex`]; SI, link axes. Not here: superelement, chains and modal links
+//! (`details.rs`, `modal.rs`), reading (`read.rs`).
 
 use flexarm_spatial::Pose;
 

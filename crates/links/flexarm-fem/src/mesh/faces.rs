@@ -1,4 +1,6 @@
 //! Corners, edges and faces of the element kinds, by local node index from 0.
+//!
+//! Not here: shape functions (`element`), the surface of a mesh (`surface.rs`).
 
 use super::ElementKind;
 

@@ -1,4 +1,6 @@
 //! Parts of a mesh that share no node: missing contacts, duplicated nodes, stray elements.
+//!
+//! Start at [`connected_parts`]. Not here: merging of coincident nodes (`coincident.rs`).
 
 use super::Mesh;
 

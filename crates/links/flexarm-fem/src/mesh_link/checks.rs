@@ -24,11 +24,13 @@ pub(super) fn gate(
     held: &Modes,
     quality: ElementQuality,
 ) -> MeshGate {
+    // Scales of the mass errors: the moment of inertia, at least 1e-6 m l².
     let from_matrix = condensed_body(element);
     let size = link.p_AB().norm().max(f64::MIN_POSITIVE);
     let inertia = |part: &RigidPart| part.spatial_inertia().fixed_view::<3, 3>(3, 3).into_owned();
     let scale = inertia(whole).diagonal().amax();
 
+    // Frequencies with A held: mesh, reduced model, condensation, two parts.
     let full = held.frequencies_hz();
     let reduced = element.frequencies_hz(&[0]);
     let guyan = element.guyan().frequencies_hz(&[0]);
@@ -40,6 +42,7 @@ pub(super) fn gate(
         guyan_hz: guyan.get(k).copied(),
         lumped_hz: lumped.get(k).copied(),
     });
+    // A free body has six modes without frequency.
     let free = element.frequencies_hz(&[]);
     let first_elastic = free.get(6).copied().unwrap_or(0.0);
     MeshGate {

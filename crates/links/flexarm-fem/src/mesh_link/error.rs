@@ -1,4 +1,7 @@
 //! Errors of turning a mesh into a link.
+//!
+//! Causes keep their own types and texts. Not here: errors of mesh files (`flexarm-fe-io`), of jobs
+//! (`flexarm-linkmaker`).
 
 use crate::chain::ChainError;
 use crate::cut::CutError;

@@ -19,7 +19,6 @@
 //! moments are then pairs of axial forces of fixed direction. At both ends of each element they are
 //! corrected to rotate by half the section rotation (semi-tangential, as torques already are);
 //! without this, frames with bends are wrong:
-//! which bent frames come out wrong:
 //!
 //! ```text
 //! G_θθ = -M_z (θx θy + θy θx)/2 + M_y (θx θz + θz θx)/2         at each end, M on the element
@@ -90,18 +89,21 @@ pub(super) fn geometric_stiffness(
     beams: &[BeamElement],
     shapes: &DMatrix<f64>,
 ) -> GeometricStiffness {
+    // Static displacements U of the mesh under each unit load.
     let model = source.condensation.model();
     let beam_forces: Vec<_> = beams.iter().map(element_forces).collect();
     let F = inertia_forces(source, beams, &beam_forces);
     let U = displacements(source, &F);
     let loads = U.ncols();
 
+    // Work of the stress of each load over the second-order strains of the shapes.
     let n = shapes.ncols();
     let mut G = vec![DMatrix::zeros(n, n); loads];
     add_solids(source, &U, shapes, &mut G);
     for (beam, forces) in beams.iter().zip(&beam_forces) {
         add_beam(beam, forces, &U, shapes, &mut G);
     }
+    // Ties carry the forces K U - F that their nodes exert; the first loads are those of inertia.
     let mut on_mesh = model.K.product(&U);
     for j in 0..FIELDS {
         on_mesh.column_mut(j).axpy(-1.0, &F.column(j), 1.0);

@@ -1,4 +1,8 @@
 //! Integrals of meshes against brute force and the FE matrices, and geometric stiffness of solids.
+//!
+//! Truths: sums over dense Gauss points, the mass matrix of the mesh, critical loads of textbooks, the
+//! frequencies of a spinning beam from the literature. Link axes; A is fixed. Not here: files
+//! (`flex_file`).
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 use std::f64::consts::PI;
@@ -140,6 +144,7 @@ fn brute_force(mesh: &Mesh, model: &FeModel, shapes: &DMatrix<f64>) -> Sums {
         for (xi, weight) in &points {
             let (mut shape, mut slope) = (vec![0.0; x.len()], vec![[0.0; 3]; x.len()]);
             shape_functions(block.kind, *xi, &mut shape, &mut slope);
+            // Position s, mass dm and shapes φ of the point.
             let J = (0..x.len()).fold(Matrix3::zeros(), |J, i| J + x[i] * Vector3::from(slope[i]).transpose());
             let dm = weight * J.determinant() * Material::STEEL.rho;
             let s: Vector3<f64> = (0..x.len()).map(|i| x[i] * shape[i]).sum();
@@ -152,6 +157,7 @@ fn brute_force(mesh: &Mesh, model: &FeModel, shapes: &DMatrix<f64>) -> Sums {
                     (0..x.len()).map(of_node).sum()
                 })
                 .collect();
+            // Sums of the integrals.
             mass += dm;
             first += s * dm;
             second += s * s.transpose() * dm;
@@ -241,6 +247,7 @@ fn frame(theory: BeamTheory) -> (Mesh, Vec<Interface>) {
     use crate::mesh::{BeamProperties, ElementBlock, Region};
     let corner = Vector3::new(0.5, 0.1, -0.2);
     let end = Vector3::new(0.6, 0.7, 0.1);
+    // Four elements per leg.
     let nodes: Vec<_> = (0..=8)
         .map(
             |k| if k <= 4 { corner * (f64::from(k) / 4.0) } else { corner + (end - corner) * (f64::from(k - 4) / 4.0) },
@@ -263,6 +270,7 @@ fn frame(theory: BeamTheory) -> (Mesh, Vec<Interface>) {
         }],
         ..Mesh::default()
     };
+    // Interfaces off the nodes, so that the levers count.
     let one = |name: &str, p: Vector3<f64>, node| Interface {
         name: name.into(),
         X_LI: at(p),

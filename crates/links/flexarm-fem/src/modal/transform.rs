@@ -143,6 +143,7 @@ impl ModalLink {
             let help = "the coordinates are not those of Craig and Bampton; orthogonalised links take `keep`";
             return Err(FemError::Missing { what: "the fixed-interface modes", help });
         }
+        // Static coordinates come first, modes by frequency after them.
         let statics = 6 * self.interfaces.len();
         let (n, kept) = (self.coordinates(), statics + modes);
         if kept > n {
@@ -150,6 +151,7 @@ impl ModalLink {
             let allowed = format!("up to {}", n - statics);
             return Err(FemError::OutOfRange { what, found: modes as f64, allowed });
         }
+        // All matrices lose the same rows and columns.
         let top = |A: &DMatrix<f64>| A.view((0, 0), (kept, kept)).into_owned();
         let pairs = (0..kept).flat_map(|k| (0..kept).map(move |l| k * n + l));
         Ok(Self {

@@ -97,6 +97,7 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressError> {
     let about = read_about(bytes)?;
     let file = SafeTensors::deserialize(bytes).map_err(|e| StressError::file(format!("damaged: {e}")))?;
     let file = Tensors { file: &file };
+    // Sizes follow from one another: materials, interfaces, modes, sites.
     let (materials, poses) = (file.rows("materials", 3)?, file.rows("pose", 12)?);
     let frequencies_hz = file.numbers("frequency_hz")?;
     let sites = file.sites(materials.len())?;
@@ -108,6 +109,7 @@ pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressError> {
         let what = format!("{} interfaces have {} poses", about.interfaces.len(), poses.len());
         return Err(StressError::file(what));
     }
+    // A pose is stored as its rotation, row by row, and its translation.
     let pose = |row: &Vec<f64>| {
         let R = Rotation3::from_matrix_unchecked(Matrix3::from_row_slice(&row[..9]));
         Pose::from_parts(Vector3::from_column_slice(&row[9..]).into(), R)

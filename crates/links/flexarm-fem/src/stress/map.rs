@@ -109,6 +109,8 @@ impl StressFields {
         parts: &[RigidPart],
         springs: &[Matrix6<f64>],
     ) -> Result<StressMap, StressError> {
+        // Displacement of B per displacement d_S of each joint, r from S to B in L:
+        //   u_B = X d_S,    X = [R_LS, -[r]x R_LS; 0, R_LS]
         let p_LB = self.poses[1].translation.vector;
         let displacement = |joint: &ElasticSplit| {
             let (R, r) = (joint.X_LS.rotation.matrix(), p_LB - joint.X_LS.translation.vector);
@@ -119,6 +121,7 @@ impl StressFields {
             X
         };
         let X: Vec<Matrix6<f64>> = joints.iter().map(displacement).collect();
+        // Compliances C of the joints, and the stiffness of B, K_B = (Σ X C Xᵀ)⁻¹.
         let singular = || StressError("the stiffness of a joint is singular".into());
         let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or_else(singular);
         let at_B = |springs: &mut dyn Iterator<Item = &Matrix6<f64>>| {
@@ -126,13 +129,17 @@ impl StressFields {
             let at_B: Matrix6<f64> = X.iter().zip(&C).map(|(X, C)| X * C * X.transpose()).sum();
             Ok::<_, StressError>((C, inverse(&at_B)?))
         };
+        // The nominal joints must give the stiffness of the link of these fields.
         let (_, nominal) = at_B(&mut joints.iter().map(|joint| &joint.K_S))?;
         self.check(&DMatrix::from_column_slice(6, 6, nominal.as_slice()))?;
         let (C, K_B) = at_B(&mut springs.iter())?;
+        // Wrench at B per joint displacement: F_B = K_B X d_S.
         let mut A = DMatrix::zeros(6, 6 * joints.len());
         for (k, X) in X.iter().enumerate() {
             A.fixed_view_mut::<6, 6>(0, 6 * k).copy_from(&(K_B * X));
         }
+        // Part of F_B that is due to the deflection under the inertia loads alone, d_S = C F_S with the
+        // loads of all parts beyond the joint.
         let own = (0..INERTIA_LOADS).map(|j| {
             let mut q = DVector::zeros(6 * joints.len());
             for (k, joint) in joints.iter().enumerate() {

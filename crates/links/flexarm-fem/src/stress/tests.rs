@@ -1,4 +1,7 @@
 //! Stress against closed forms and energies.
+//!
+//! Truths: F/A, M c/I, the centrifugal load of a bar, the energy ½ ηᵀ K η of the amplitudes, and one
+//! model of a link against another. Link axes, Pa. Not here: beams (`beam.rs`).
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 mod beam;
@@ -131,6 +134,7 @@ fn the_energy_of_the_stress_is_that_of_the_amplitudes() {
         let mut bar = Bar::new(kind, [6, 2, 2], [0.4, 0.1, 0.05]);
         bar.material = Material::ALUMINIUM;
         let (largest, smallest) = bar.reduced(4, |source| {
+            // Displacement of six interface amplitudes and four modes.
             let model = source.condensation.model();
             let (T, modes) = (source.condensation.shapes(), &source.fixed_modes.shapes);
             let eta = [1e-4, -2e-4, 3e-4, 1e-3, 2e-3, -1e-3, 1e-5, 2e-5, -1e-5, 3e-5];
@@ -139,6 +143,7 @@ fn the_energy_of_the_stress_is_that_of_the_amplitudes() {
                 let column = if k < 6 { T.column(6 + k) } else { modes.column(k - 6) };
                 u.column_mut(0).axpy(*eta, &column, 1.0);
             }
+            // Energy of the stress over the points, σᵀ C σ / 2, isotropic.
             let (materials, quadrature) = (source.materials, source.quadrature);
             let recovery = StressRecovery { mesh: source.mesh, model, materials, quadrature };
             let (E, nu) = (materials[0].E, materials[0].nu);
@@ -181,14 +186,9 @@ fn a_stress_file_returns_what_was_written_and_refuses_damage() {
     assert!(parse_stress(&newer).unwrap_err().to_string().contains("flexarm stress 9"));
 }
 
-/// Truth: the field of the mesh. A link at rest in an accelerated frame has the deflection of its
-/// model, here by the mass matrix of the modal link and by Newton's law for rigid parts; its stress
-/// does not depend on the model.
-#[test]
-fn the_stress_of_a_link_at_rest_does_not_depend_on_its_model() {
-    let mut bar = Bar::new(ElementKind::Tet10, [8, 2, 2], [0.6, 0.1, 0.05]);
-    bar.material = Material::ALUMINIUM;
-    let plan = LinkPlan {
+/// Plan of a bar with two parts, a chain of four and six modes, with stress.
+fn plan(bar: &Bar) -> LinkPlan {
+    LinkPlan {
         name: "bar".into(),
         interfaces: bar.interfaces.clone(),
         assembly: AssemblyOptions { quadrature: bar.quadrature, material: Some(bar.material) },
@@ -202,8 +202,41 @@ fn the_stress_of_a_link_at_rest_does_not_depend_on_its_model() {
         judged_modes: 6,
         limits: Default::default(),
         provenance: Default::default(),
-    };
-    let reduction = reduce_mesh(&bar.mesh, &plan, &mut |_| {}).unwrap();
+    }
+}
+
+/// Deflections of the joints of a link at rest in a frame with the accelerations `a` and `alpha`: by
+/// Newton's law for the parts beyond each joint.
+fn deflections_of_parts(
+    joints: &[ElasticSplit],
+    parts: &[RigidPart],
+    a: &Vector3<f64>,
+    alpha: &Vector3<f64>,
+) -> DVector<f64> {
+    let deflections = joints.iter().enumerate().flat_map(|(k, joint)| {
+        let p = joint.X_LS.translation.vector;
+        let mut F = nalgebra::Vector6::zeros();
+        for part in &parts[k + 1..] {
+            let force = -(a + alpha.cross(&part.com)) * part.mass;
+            let torque = (part.com - p).cross(&force) - part.inertia * alpha;
+            let R = joint.X_LS.rotation.inverse();
+            let (force, torque) = (R * force, R * torque);
+            F += nalgebra::Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
+        }
+        let e = joint.K_S.cholesky().unwrap().solve(&F);
+        e.iter().copied().collect::<Vec<_>>()
+    });
+    DVector::from_vec(deflections.collect())
+}
+
+/// Truth: the field of the mesh. A link at rest in an accelerated frame has the deflection of its
+/// model, here by the mass matrix of the modal link and by Newton's law for rigid parts; its stress
+/// does not depend on the model.
+#[test]
+fn the_stress_of_a_link_at_rest_does_not_depend_on_its_model() {
+    let mut bar = Bar::new(ElementKind::Tet10, [8, 2, 2], [0.6, 0.1, 0.05]);
+    bar.material = Material::ALUMINIUM;
+    let reduction = reduce_mesh(&bar.mesh, &plan(&bar), &mut |_| {}).unwrap();
     let (fields, link) = (reduction.stress.unwrap(), reduction.link);
     let details = link.details.as_ref().unwrap();
     let (a, alpha) = (Vector3::new(1.0, -2.0, 9.81), Vector3::new(5.0, 30.0, -8.0));
@@ -217,22 +250,7 @@ fn the_stress_of_a_link_at_rest_does_not_depend_on_its_model() {
         let force = -(modal.mass_matrix().view((6, 0), (n, 6)) * frame);
         modal.K.clone().cholesky().unwrap().solve(&force)
     };
-    let of_parts = |joints: &[ElasticSplit], parts: &[RigidPart]| {
-        let deflections = joints.iter().enumerate().flat_map(|(k, joint)| {
-            let p = joint.X_LS.translation.vector;
-            let mut F = nalgebra::Vector6::zeros();
-            for part in &parts[k + 1..] {
-                let force = -(a + alpha.cross(&part.com)) * part.mass;
-                let torque = (part.com - p).cross(&force) - part.inertia * alpha;
-                let R = joint.X_LS.rotation.inverse();
-                let (force, torque) = (R * force, R * torque);
-                F += nalgebra::Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z);
-            }
-            let e = joint.K_S.cholesky().unwrap().solve(&F);
-            e.iter().copied().collect::<Vec<_>>()
-        });
-        DVector::from_vec(deflections.collect())
-    };
+    let of_parts = |joints: &[ElasticSplit], parts: &[RigidPart]| deflections_of_parts(joints, parts, &a, &alpha);
     let modal = details.modal.as_ref().unwrap();
     let (few, chain) = (modal.truncated(2).unwrap(), &details.chains[0]);
     let two = (std::slice::from_ref(&link.split), [link.proximal, link.distal]);

@@ -84,12 +84,8 @@ pub(crate) fn tokens(text: &str, file: usize, spelling: &Spelling) -> Result<Vec
                 push(Token::Quoted(rest[1..length - 1].into()), length)
             }
             c if c.is_ascii_digit() || (c == '.' && bytes.get(at + 1).is_some_and(u8::is_ascii_digit)) => {
-                let length = number_length(rest);
-                let written = &rest[..length];
-                let Ok(value) = written.parse::<f64>() else {
-                    return fail(Span { file, start: at, end: at + length }, format!("`{written}` is not a number"));
-                };
-                push(Token::Number(value, written.bytes().all(|b| b.is_ascii_digit())), length)
+                let (token, length) = number(rest, file, at)?;
+                push(token, length)
             }
             c if is_name(c) => {
                 let length = rest.find(|c: char| !is_name(c) && !c.is_ascii_digit()).unwrap_or(rest.len());
@@ -128,6 +124,16 @@ fn text_length(rest: &str, quote: char, doubled: bool) -> Option<usize> {
         }
     }
     None
+}
+
+/// Returns the number at the beginning of a text, and its length in bytes.
+fn number(rest: &str, file: usize, start: usize) -> Result<(Token, usize)> {
+    let length = number_length(rest);
+    let written = &rest[..length];
+    let Ok(value) = written.parse::<f64>() else {
+        return fail(Span { file, start, end: start + length }, format!("`{written}` is not a number"));
+    };
+    Ok((Token::Number(value, written.bytes().all(|b| b.is_ascii_digit())), length))
 }
 
 /// Length in bytes of a number without sign.

@@ -170,6 +170,7 @@ impl Gcode<'_> {
         centre: [f64; 2],
         span: Span,
     ) -> Result<Helix> {
+        // In the plane (u, v): start a and end b from the centre, at equal distances.
         let [u, v, w] = self.plane.axes();
         let (a, b) = ([start[u] - centre[0], start[v] - centre[1]], [goal[u] - centre[0], goal[v] - centre[1]]);
         let (radius, end_radius) = (a[0].hypot(a[1]), b[0].hypot(b[1]));
@@ -187,6 +188,7 @@ impl Gcode<'_> {
                 ),
             );
         }
+        // Angle from a to b in the direction of the motion; a whole turn if they are the same.
         let (from, to) = (a[1].atan2(a[0]), b[1].atan2(b[0]));
         let is_whole = (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9;
         let turn = if is_whole { 0.0 } else { (to - from).rem_euclid(TAU) };

@@ -61,6 +61,7 @@ impl Gcode<'_> {
         if !['X', 'Y', 'Z', 'A', 'B', 'C', 'I', 'J', 'K', 'R'].iter().any(|letter| values.contains_key(letter)) {
             return Ok(());
         }
+        // G53 (code 530): machine coordinates, for absolute lines only.
         let in_machine = codes.iter().any(|(code, _)| *code == 530);
         let Some(motion) = self.motion else {
             return fail(span, "coordinates without G0, G1, G2 or G3 in force: put one before them");
@@ -75,6 +76,7 @@ impl Gcode<'_> {
         if in_machine {
             return self.machine_move(values, feed, span);
         }
+        // Arcs keep the orientation of the tool; all other moves are lines.
         let goal = self.goal(values, false)?;
         if is_arc {
             if before != self.rotary {

@@ -168,6 +168,7 @@ impl Reader<'_> {
         self.pass()?;
         let from = self.at;
         match self.text.get(self.at) {
+            // An expression in brackets.
             Some(b'[') => {
                 self.at += 1;
                 let value = self.sum()?;
@@ -178,6 +179,7 @@ impl Reader<'_> {
                 self.at += 1;
                 Ok(value)
             }
+            // A parameter.
             Some(b'#') => {
                 self.at += 1;
                 let name = self.parameter_name()?;
@@ -191,10 +193,12 @@ impl Reader<'_> {
                     ),
                 }
             }
+            // The negative of either.
             Some(b'-') if self.text.get(self.at + 1).is_some_and(|next| matches!(next, b'#' | b'[')) => {
                 self.at += 1;
                 Ok(-self.value()?)
             }
+            // A function with its argument, or a number.
             Some(byte) if byte.is_ascii_alphabetic() => self.function(),
             _ => self.number(),
         }

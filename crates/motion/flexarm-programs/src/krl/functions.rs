@@ -19,6 +19,7 @@ pub(super) fn inline_form(
     span: Span,
 ) -> Result<Option<Value>> {
     Ok(Some(match name {
+        // Tool and base by their numbers.
         "stool2" => {
             let (value, at) = machine.argument(arguments, 0, span)?;
             let number = part(&value, "tool_no", at)?.count(at)?;
@@ -28,12 +29,14 @@ pub(super) fn inline_form(
             let number = machine.number(arguments, 0, span)? as i64;
             base_data(machine, number, span)?
         }
+        // Speed, acceleration and orientation of the move.
         "svel_joint" | "sipo_mode" => machine.argument(arguments, 0, span)?.0,
         "sacc_joint" => data(machine, arguments, 0, "acc", span)?,
         "sori_typ" => {
             let (value, at) = machine.argument(arguments, 0, span)?;
             part(&value, "ori_typ", at).unwrap_or(Value::Word("var".into()))
         }
+        // Blending, path speed and path acceleration: the present record with the new component.
         "sapo_ptp" | "sapo" => {
             let distance = data(machine, arguments, 0, "apo_dist", span)?;
             let mut apo = record_of(machine.global("$apo"));
@@ -52,6 +55,7 @@ pub(super) fn inline_form(
             acceleration.set("cp", path_acceleration(machine, percent, span)?);
             Value::Record(Rc::new(acceleration))
         }
+        // No effect on the path.
         "sload" | "sgear_jerk" | "sjerk" | "use_cm_pro_values" => Value::Nothing,
         _ => return Ok(None),
     }))
@@ -78,6 +82,7 @@ fn part(value: &Value, name: &str, span: Span) -> Result<Value> {
 
 /// Functions of numbers and frames.
 pub(super) fn mathematics(machine: &mut Krls<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Value> {
+    // Arguments as numbers; a value from outside the program makes the result one.
     let mut numbers = Vec::new();
     for (k, argument) in arguments.iter().enumerate() {
         let Some(expression) = &argument.value else { continue };
@@ -92,6 +97,7 @@ pub(super) fn mathematics(machine: &mut Krls<'_>, name: &str, arguments: &[Argum
         Some(number) => Ok(*number),
         None => fail(span, format!("`{name}` misses argument {}", k + 1)),
     };
+    // Angles are in degrees.
     Ok(Value::Number(match name {
         "abs" => at(0)?.abs(),
         "sqrt" => at(0)?.sqrt(),

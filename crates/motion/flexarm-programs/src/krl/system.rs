@@ -35,12 +35,14 @@ pub(super) fn set_up(machine: &mut Krls<'_>) {
     let parts = |names: &[&str]| Value::record("", names.iter().map(|name| (*name, Value::Nothing)).collect());
     let zero = frame_value([0.0; 6]);
     for (name, value) in [
+        // Speeds, accelerations and blending, unset until the program sets them.
         ("$vel", parts(&["cp", "ori1", "ori2"])),
         ("$acc", parts(&["cp", "ori1", "ori2"])),
         ("$apo", parts(&["cptp", "cdis", "cvel", "cori"])),
         ("$vel_axis", Value::list(Vec::new())),
         ("$acc_axis", Value::list(Vec::new())),
         ("$ov_pro", Value::Whole(100)),
+        // Frames and interpolation.
         ("$base", Value::Nothing),
         ("$tool", Value::Nothing),
         ("$robroot", zero.clone()),
@@ -50,9 +52,11 @@ pub(super) fn set_up(machine: &mut Krls<'_>) {
         ("$ori_type", Value::Word("var".into())),
         ("$circ_type", Value::Word("base".into())),
         ("$sen_ori_type", Value::Nothing),
+        // Outputs and flags.
         ("$out", Value::list(Vec::new())),
         ("$flag", Value::list(Vec::new())),
         ("$cycflag", Value::list(Vec::new())),
+        // Data of the inline forms.
         ("pdat_act", parts(&["vel", "acc", "apo_dist", "apo_mode"])),
         ("ldat_act", parts(&["vel", "acc", "apo_dist", "apo_fac", "ori_typ"])),
         ("fdat_act", parts(&["tool_no", "base_no", "ipo_frame"])),

@@ -147,6 +147,7 @@ impl Dialect for Rapid {
             return Ok(Flow::On);
         }
         match name {
+            // Waiting: for a time, or for a signal, whose value is outside the program.
             "waittime" => {
                 let seconds = machine.number(arguments, 0, span)?;
                 machine.recorder.dwell(seconds, span)?;
@@ -159,12 +160,14 @@ impl Dialect for Rapid {
                 machine.wait_for(condition, at, span)?;
             }
             "waitrob" => machine.recorder.stop(),
+            // Stops and the end of a cycle.
             "stop" | "break" => {
                 machine.recorder.stop();
                 machine.recorder.note("the program stops for the operator: it continues at once", span);
             }
             "exitcycle" => return Ok(Flow::Halt),
             "incr" | "decr" | "add" | "clear" => count(machine, name, arguments, span)?,
+            // Dialogues: the answer is outside the program.
             "tpreadnum" | "tpreadfk" | "tpreaddnum" | "uimsgbox" | "clkread" => {
                 if let Some(place) = crate::common::machine::positional(arguments, 0).filter(|_| name.starts_with("tp"))
                 {
@@ -172,6 +175,7 @@ impl Dialect for Rapid {
                 }
                 machine.recorder.note("messages are not shown", span);
             }
+            // Instructions that do not move the robot.
             _ if Self::is_still(name) => machine.recorder.note(still_words(name), span),
             _ => {
                 return fail(

@@ -19,10 +19,12 @@ pub(super) type Records = HashMap<Rc<str>, Fields>;
 /// Fields of a built-in type, with their types.
 fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {
     Some(match kind {
+        // Places, orientations (quaternions), configurations.
         "pos" => &[("x", "num"), ("y", "num"), ("z", "num")],
         "orient" => &[("q1", "num"), ("q2", "num"), ("q3", "num"), ("q4", "num")],
         "pose" => &[("trans", "pos"), ("rot", "orient")],
         "confdata" => &[("cf1", "num"), ("cf4", "num"), ("cf6", "num"), ("cfx", "num")],
+        // Axes: external ones and those of the robot.
         "extjoint" => &[
             ("eax_a", "num"),
             ("eax_b", "num"),
@@ -39,6 +41,7 @@ fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {
             ("rax_5", "num"),
             ("rax_6", "num"),
         ],
+        // Targets, speeds, zones.
         "robtarget" => &[("trans", "pos"), ("rot", "orient"), ("robconf", "confdata"), ("extax", "extjoint")],
         "jointtarget" => &[("robax", "robjoint"), ("extax", "extjoint")],
         "speeddata" => &[("v_tcp", "num"), ("v_ori", "num"), ("v_leax", "num"), ("v_reax", "num")],
@@ -51,6 +54,7 @@ fn fields(kind: &str) -> Option<&'static [(&'static str, &'static str)]> {
             ("zone_leax", "num"),
             ("zone_reax", "num"),
         ],
+        // Loads, tools, work objects.
         "loaddata" => {
             &[("mass", "num"), ("cog", "pos"), ("aom", "orient"), ("ix", "num"), ("iy", "num"), ("iz", "num")]
         }

@@ -130,6 +130,7 @@ fn geometry<'v>(name: &str, at: impl Fn(usize) -> Result<&'v Value>, span: Span)
 /// Functions of lists and texts; `None` if the name is not one of them.
 fn list_or_text<'v>(name: &str, at: impl Fn(usize) -> Result<&'v Value>, span: Span) -> Result<Option<Value>> {
     Ok(Some(match name {
+        // Lists.
         "length" => match at(0)? {
             Value::List(values) => Value::Number(values.len() as f64),
             Value::Pose(_) => Value::Number(6.0),
@@ -139,6 +140,7 @@ fn list_or_text<'v>(name: &str, at: impl Fn(usize) -> Result<&'v Value>, span: S
             let count = usize::try_from(at(0)?.count(span)?).unwrap_or(0).min(10_000);
             Value::list(vec![at(1)?.clone(); count])
         }
+        // Texts.
         "to_num" => match at(0)? {
             Value::Text(text) => match text.trim().parse() {
                 Ok(number) => Value::Number(number),
@@ -151,6 +153,7 @@ fn list_or_text<'v>(name: &str, at: impl Fn(usize) -> Result<&'v Value>, span: S
             (Value::Text(a), Value::Text(b)) if a.len() + b.len() < 10_000 => Value::text(&format!("{a}{b}")),
             _ => Value::text(""),
         },
+        // Vectors.
         "norm" => match at(0)? {
             Value::List(_) => Value::Number(at(0)?.numbers(span)?.iter().map(|part| part * part).sum::<f64>().sqrt()),
             other => Value::Number(other.number(span)?.abs()),

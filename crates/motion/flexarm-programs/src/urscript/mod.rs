@@ -96,6 +96,7 @@ impl Dialect for UrScript {
                 let (value, at) = machine.argument(arguments, 0, span)?;
                 machine.dialect.X_FT = Some(pose_rotation_vector(pose(&value, at)?));
             }
+            // Waiting and stopping.
             "sleep" => {
                 let seconds = machine.number(arguments, 0, span)?;
                 machine.recorder.dwell(seconds, span)?;
@@ -107,6 +108,7 @@ impl Dialect for UrScript {
                 machine.recorder.stop();
                 machine.recorder.note("messages are not shown, and none waits for an answer", span);
             }
+            // The rest: motion by outside data, no motion, or a function whose result is dropped.
             _ if is_refused(name) => {
                 return fail(
                     span,

@@ -40,6 +40,40 @@ fn is_comment(line: &str) -> bool {
     line.starts_with('#') || line.starts_with("//") || (line.starts_with('%') && !line.starts_with("%time"))
 }
 
+fn are_numbers(fields: &[String]) -> bool {
+    fields.iter().all(|field| number(field).is_some())
+}
+
+/// Returns line and names of the header of a file that begins with numbers: those of the last comment
+/// before them, as numpy writes it, or empty names if the request counts columns.
+///
+/// * `first`: the first line of numbers, `comment`: that comment, each with its line.
+fn header_of_numbers(
+    separator: Separator,
+    first: (usize, &str),
+    comment: Option<(usize, &str)>,
+    request: &TableRequest<'_>,
+) -> Result<(usize, Vec<String>), Box<Finding>> {
+    let width = separator.split(first.1).len();
+    let named = comment
+        .map(|(line, text)| (line, separator.split(text.trim_start().trim_start_matches(['#', '%', '/']).trim())));
+    let named = named
+        .filter(|(_, names)| names.len() == width && !are_numbers(names) && names.iter().all(|name| !name.is_empty()));
+    let by_number = request.columns.is_some_and(|map| map.time.as_ref().is_some_and(|t| t.starts_with('#')));
+    match named {
+        Some(header) => Ok(header),
+        None if by_number => Ok((first.0, vec![String::new(); width])),
+        None => {
+            let message = format!(
+                "the table has {width} columns of numbers and no header; put one above (`time,<joint>,...`), \
+                 or tell the columns by number: {} t=#1[s],<joint>=#2[rad]",
+                Setting::Columns
+            );
+            Err(fault("no-header", message))
+        }
+    }
+}
+
 impl<'t> Table<'t> {
     /// Finds header and separator.
     ///
@@ -53,34 +87,17 @@ impl<'t> Table<'t> {
             return Err(findings::at(&file, fault("empty", message)));
         };
         let second = content.next();
-        // In a file without a header line the last comment before the numbers may be the header, as
-        // numpy writes it.
-        let comment = lines().take_while(|(line, _)| *line < first_line).filter(|(_, line)| is_comment(line)).last();
-        let comment = comment.map(|(line, text)| (line, text.trim_start().trim_start_matches(['#', '%', '/']).trim()));
-
-        let are_numbers = |fields: &[String]| fields.iter().all(|field| number(field).is_some());
+        // A file of numbers alone, or a header with or without text above it.
         let numeric = Separator::ALL.into_iter().find(|separator| {
             let fields = separator.split(first);
             fields.len() > 1 && are_numbers(&fields)
         });
         let (separator, header_line, names, from) = if let Some(separator) = numeric {
-            let width = separator.split(first).len();
-            let named = comment.map(|(line, text)| (line, separator.split(text))).filter(|(_, names)| {
-                names.len() == width && !are_numbers(names) && names.iter().all(|name| !name.is_empty())
-            });
-            let by_number = request.columns.is_some_and(|map| map.time.as_ref().is_some_and(|t| t.starts_with('#')));
-            match named {
-                Some((line, names)) => (separator, line, names, first_line),
-                None if by_number => (separator, first_line, vec![String::new(); width], first_line),
-                None => {
-                    let message = format!(
-                        "the table has {width} columns of numbers and no header; put one above (`time,<joint>,...`), \
-                         or tell the columns by number: {} t=#1[s],<joint>=#2[rad]",
-                        Setting::Columns
-                    );
-                    return Err(findings::at(&file.line(first_line), fault("no-header", message)));
-                }
-            }
+            let comment =
+                lines().take_while(|(line, _)| *line < first_line).filter(|(_, line)| is_comment(line)).last();
+            let (line, names) = header_of_numbers(separator, (first_line, first), comment, request)
+                .map_err(|fault| findings::at(&file.line(first_line), fault))?;
+            (separator, line, names, first_line)
         } else {
             match below_preamble(
                 &lines().filter(|(_, l)| !l.trim().is_empty() && !is_comment(l)).take(200).collect::<Vec<_>>(),
@@ -92,6 +109,7 @@ impl<'t> Table<'t> {
                 }
             }
         };
+        // Below the header: a line of units, if there is one, then the lines of numbers.
         let preamble = if header_line > first_line { Some((first_line, header_line - 1)) } else { None };
         let mut lines: Vec<(usize, &str)> =
             lines().filter(|(n, line)| *n >= from && !line.trim().is_empty() && !is_comment(line)).collect();

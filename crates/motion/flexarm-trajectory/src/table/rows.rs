@@ -118,6 +118,13 @@ impl Table<'_> {
         if let Some((first, more)) = wrong {
             return Err(self.with_further(first, &more));
         }
+        self.check_decimals(&decimals)?;
+        rows.comma = decimals.comma.is_some();
+        Ok(rows)
+    }
+
+    /// Checks that numbers have decimal points or decimal commas, but not both.
+    fn check_decimals(&self, decimals: &Decimals) -> Result<(), Box<Finding>> {
         if let (Some(point), Some(comma)) = (decimals.point, decimals.comma) {
             let message = format!(
                 "numbers have decimal points ({}) and decimal commas ({}); write all in one way, without separators of \
@@ -128,8 +135,7 @@ impl Table<'_> {
             let (line, field) = point.max(comma);
             return Err(self.at_field(line, field, fault("mixed-decimals", message)));
         }
-        rows.comma = decimals.comma.is_some();
-        Ok(rows)
+        Ok(())
     }
 
     /// Splits a line of numbers.

@@ -47,6 +47,7 @@ fn two_link_arms(case: &mut Case, found: &TwoLink) {
          spectral elements, converged to 4e-8 m. Generalised-alpha with steps of {} ms.",
         plain(1e3 * two_link::STEP_S)
     ));
+    // Distance of the tip from the exact beams, by run and method.
     let mut table = Table::new(
         "Maximum distance of the tip from the truth, over the maximum distance of the truth from the rigid arm.",
         &["run", "peak [mm]"],
@@ -57,6 +58,7 @@ fn two_link_arms(case: &mut Case, found: &TwoLink) {
         table.rows.push(cells.chain(run.errors.iter().map(|e| error(*e))).collect());
     }
     case.table(table);
+    // Bounds for chains in every run, for modal links within their range of deflections.
     for (k, (parts, bound)) in PARTS.iter().zip(CHAIN_BOUNDS).enumerate() {
         let worst = found.runs.iter().map(|run| run.errors[k]).worst();
         case.claim(format!("tip of two-link arms, {parts} parts, worst run"), EXACT_ARM, worst, Bound::AtMost(bound));
@@ -68,6 +70,7 @@ fn two_link_arms(case: &mut Case, found: &TwoLink) {
         let text = format!("tip in {name}, modal links with stiffness by load");
         case.claim(text, EXACT_ARM, error_of(name, STIFFENED), Bound::AtMost(bound));
     }
+    // Without stiffness by load the error of the spin must show.
     let text = "the same in spin_30 without stiffness by load";
     case.claim(text, EXACT_ARM, error_of("spin_30", LINEAR), Bound::AtLeast(0.03));
     case.text(format!(
@@ -111,6 +114,7 @@ fn slider_crank(case: &mut Case, found: &SliderCrank) {
         error(found.truths_apart.1).print(),
         plain(1e3 * slider_crank::STEP_S)
     ));
+    // Errors of the slider and of the rod's middle against both truths.
     let [exact, linear] = found.peak_m.map(|peak| fixed(1e3 * peak, 4).print());
     let mut table = Table::new(
         format!(
@@ -125,6 +129,7 @@ fn slider_crank(case: &mut Case, found: &SliderCrank) {
         table.rows.push([word(format!("two of {}", run.method))].into_iter().chain(slider).chain(middle).collect());
     }
     case.table(table);
+    // Chains against the exact rod, with both ways to close the loop.
     let chain = &found.runs[CHAIN];
     let text = "slider of the slider crank, 8 parts per half, over the rod's length";
     case.claim(text, EXACT_ROD, chain.slider_m[0] / 0.3, Bound::AtMost(1e-5));
@@ -133,6 +138,7 @@ fn slider_crank(case: &mut Case, found: &SliderCrank) {
     let text = "slider with compliant constraints, over the rod's length";
     case.claim(text, EXACT_ROD, constrained.slider_m[0] / 0.3, Bound::AtMost(1e-5));
     case.claim("rod's deflection with compliant constraints", EXACT_ROD, constrained.middle[0], Bound::AtMost(0.01));
+    // Modal links with and without stiffness by load: the effect of the axial force must show.
     let [plain_modal, stiffened] = [LINEAR_ROD, STIFFENED_ROD].map(|k| found.runs[k].middle[0]);
     let text = "rod's deflection, modal links with stiffness by load";
     case.claim(text, EXACT_ROD, stiffened, Bound::AtMost(0.01));

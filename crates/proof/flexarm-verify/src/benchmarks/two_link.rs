@@ -1,4 +1,8 @@
 //! Two-link arms of slender beams against geometrically exact beams.
+//!
+//! Chains of rigid parts and modal links follow two motions; compared is the distance of the tip from
+//! that of the rigid arm (plane of motion, m). Truth: files of spectral elements of Reissner's beams.
+//! Not here: bounds and words (`page.rs`).
 
 use nalgebra::Vector2;
 

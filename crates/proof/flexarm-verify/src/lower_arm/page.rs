@@ -189,6 +189,7 @@ fn frequency_figure(found: &Frequencies) -> Figure {
 fn ties(case: &mut Case, whole: &MeshResult) {
     case.heading("Rigid or distributing ties");
     let found: &Ties = &whole.ties;
+    // Compliance and frequencies with each pair of ties, over those of rigid ties.
     let mut table = Table::new(
         "The same mesh, seats tied rigidly (RBE2) or by the mean of their nodes (RBE3, equal weights): compliance along each load and frequencies, over those of rigid ties, less one.",
         &["A", "B"],
@@ -200,6 +201,7 @@ fn ties(case: &mut Case, whole: &MeshResult) {
         let errors = tied.compliance.iter().chain(&tied.hz).map(|e| signed(*e));
         table.rows.push(cells.chain(errors).collect());
     }
+    // Distributing ties of the other programs against those here.
     for (name, difference) in &found.programs {
         let text = "casting, distributing ties, loads at the flange, the mesh";
         case.claim(text, *name, *difference, Bound::AtMost(1e-7));

@@ -1,4 +1,7 @@
 //! Results of the mesh and of the other programs, with A held.
+//!
+//! The mesh is assembled and condensed here; stored results of CalculiX and NGSolve check it. Link
+//! axes, SI. Not here: models under test (`study.rs`).
 
 use flexarm::Robot;
 use nalgebra::{Matrix6, Vector3, Vector6};

@@ -1,4 +1,7 @@
 //! The page of the case, second half: links and drives.
+//!
+//! The first table compares links, drives and both; the second, with elastic drives, compares steppers
+//! and models of the links. Truth: modal links, stepper with error control. Not here: numbers (`drives.rs`).
 
 use flexarm_draw::{CurveLook, Panel};
 
@@ -19,6 +22,7 @@ pub(super) fn which_flexibility(case: &mut Case, found: &Flexibilities) {
          is an upper bound. Motors follow the motion exactly; spring-damper, two parts, {} ms.",
         plain(1e3 * STEP_S)
     ));
+    // Deflection, sag and frequencies with links, drives, and both elastic.
     let mut table = Table::new(
         "Largest deflection along x, y, z, in all and its RMS [mm]; sag at the start [mm]; first frequencies there [Hz].",
         &["motion", "flexible", "x", "y", "z", "peak", "RMS", "sag"],
@@ -33,6 +37,7 @@ pub(super) fn which_flexibility(case: &mut Case, found: &Flexibilities) {
         table.rows.push(cells);
     }
     case.table(table);
+    // Springs in series: at rest the two deflections add up.
     case.claim(
         "sag of links and drives together: sum of the two alone",
         "series springs, to first order",

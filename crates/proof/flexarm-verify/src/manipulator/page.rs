@@ -163,6 +163,7 @@ fn pick(case: &mut Case, found: &Pick) {
         plain(found.picked_s),
         plain(found.placed_s)
     );
+    // Each stepper against error control on the same links.
     let mut table = Table::new(caption, &["links", "stepper", "x", "y", "z", "peak", "sag", "Δ"]);
     let row = |links: &str, stepper: &str, run: &Run, distance: Cell| {
         let cells = [word(links), word(stepper)].into_iter().chain(deflections(run, 4));
@@ -176,10 +177,12 @@ fn pick(case: &mut Case, found: &Pick) {
         let bound = if *explicit { 1e-4 } else { 5e-3 };
         case.claim(text, "the same links, error control", *apart, Bound::AtMost(bound));
     }
+    // The runs with error control themselves, for their deflections.
     for (links, run) in &found.truths {
         table.rows.push(row(links, "error control", run, word("")));
     }
     case.table(table);
+    // The curve along z, in which the workpiece loads the arm.
     let drawn = &found.picked[pick::DRAWN];
     let curves = vec![
         curve(&found.truths[0].1, "error control", CurveLook::Total, 2),

@@ -51,6 +51,7 @@ fn torques(case: &mut Case, found: &Torques) {
         plain(SMOOTH_HZ),
         plain(EDGE_S)
     ));
+    // Residuals of each variant of the model, run by run.
     let mut table = Table::new("RMS of measured minus computed over RMS of the torque [%].", &["model", "run"]);
     table.columns.extend((1..=AXES).map(|k| format!("A{k}")));
     for ((what, _), runs) in VARIANTS.iter().zip(&found.errors) {
@@ -60,6 +61,7 @@ fn torques(case: &mut Case, found: &Torques) {
         }
     }
     case.table(table);
+    // Bounds for the full model in the runs outside the fit, and for what each omission costs.
     let worst_unseen = |variant: usize, axis: usize| found.errors[variant].iter().skip(1).map(|run| run[axis]).worst();
     for (axis, bound) in TORQUE_BOUNDS.into_iter().enumerate() {
         let text = format!("torque of axis {} in the unseen runs", axis + 1);
@@ -74,6 +76,7 @@ fn torques(case: &mut Case, found: &Torques) {
         Bound::AtLeast(0.3),
     );
     case.claim("the same of axis 1 without the rotors", "recorded motor torques", least(2, 0), Bound::AtLeast(0.2));
+    // The fitted friction.
     let mut table = Table::new(
         "Friction of run 1, on the joint's side.",
         &["axis", "offset [N m]", "viscous [N m s/rad]", "Coulomb [N m]"],
@@ -132,6 +135,7 @@ fn gears(case: &mut Case, found: &Gears) {
         stiffness(1),
         stiffness(2)
     ));
+    // Residual of the measured deflection: rigid gear, spring, encoder errors.
     let mut table = Table::new(
         "RMS of what is left of the measured deflection [µrad].",
         &["axis", "rigid gear", "elastic gear", "and ripple", "and eccentricity"],
@@ -141,6 +145,7 @@ fn gears(case: &mut Case, found: &Gears) {
         table.rows.push([word(format!("A{}", axis + 1))].into_iter().chain(cells).collect());
     }
     case.table(table);
+    // The spring must explain the deflection, and a rigid gear must not.
     for (axis, rigid) in [1, 2].into_iter().zip(RIGID_GEAR) {
         let rest = found.rests[axis];
         let name = axis + 1;
@@ -186,6 +191,7 @@ fn servos(case: &mut Case, found: &Servos) {
          of the source have no documented units, and its controller closes axes 1 to 3 on the link encoder. \
          Only orders of magnitude are compared.",
     );
+    // Tracking errors, recorded and simulated with and without feedforward.
     let mut table =
         Table::new("RMS of reference minus position (links of axes 1 to 3, motors of 4 to 6) [deg].", &["what"]);
     table.columns.extend((1..=AXES).map(|k| format!("A{k}")));
@@ -199,6 +205,7 @@ fn servos(case: &mut Case, found: &Servos) {
         table.rows.push([word(what)].into_iter().chain(cells).collect());
     }
     case.table(table);
+    // Servos without delay must follow at least as closely as the recorded ones.
     let worst = (0..WITH_ENCODER).map(|axis| found.alone[axis] / found.measured[axis]).worst();
     case.claim(
         "tracking error of axes 1 to 3 under servos over the measured one",

@@ -30,6 +30,7 @@ pub(super) fn mesh(case: &mut Case, found: &BarMesh) {
 
 fn mesh_end_loads(case: &mut Case, found: &BarMesh) {
     let BarMesh { own, calculix, methods, .. } = found;
+    // Own mesh against both beam theories, CalculiX and every method on the reduced link.
     let mut table = Table::new(
         "Six end loads: displacement of the end along the load per unit of it, own mesh; Euler-Bernoulli's and Timoshenko's beam against the mesh; CalculiX and each \
          method (robot of the reduced link) against the mesh, largest of six components over `sqrt(C_ii C_jj)`.",
@@ -43,6 +44,7 @@ fn mesh_end_loads(case: &mut Case, found: &BarMesh) {
     }
     add_errors(&mut table, own, methods);
     case.table(table);
+    // The same mesh in another program, then the robots made from it.
     case.claim(
         "end loads, own mesh against another program on the same mesh",
         "CalculiX",
@@ -56,6 +58,7 @@ fn mesh_end_loads(case: &mut Case, found: &BarMesh) {
          in torsion. The section has few elements for the warping of a rectangle; a finer mesh is in \
          `robots/test/one_beam/fe/README.md`.",
     );
+    // Timoshenko's beam differs by the ties and by the coarse section.
     let claims = [
         ("Timoshenko's beam, stretch and bending", found.bending_error(), 0.01),
         ("Timoshenko's beam, torsion (coarse section)", found.torsion_error(), 0.05),

@@ -70,6 +70,7 @@ fn stations(case: &mut Case, found: &Stations) {
     let caption = format!(
         "Force F_z of {load} mN or moment -M_y of {load} mN m at x = a: deflection w and slope w' of the loaded station in closed form, and the error there."
     );
+    // Deflection and slope at the loaded station and at the end, by number of parts.
     let [mut there, mut end] = [caption, "The same loads, deflection and slope of the end.".into()].map(|caption| {
         let mut table = Table::new(caption, &["load at a/l", "", "", "closed form [µm, µrad]"]);
         table.columns.extend(COUNTS.map(|n| format!("{n} parts")));
@@ -87,6 +88,7 @@ fn stations(case: &mut Case, found: &Stations) {
          slice sees all of its joint or none of it. The joints of a robot load links at their ends, so this \
          matters for own weight, and for cables and motors on a link.",
     );
+    // At the end, a load at the end is exact for any number of parts.
     case.claim(
         format!(
             "deflection and slope of the end under a load at the end, {} to {} parts",
@@ -147,6 +149,7 @@ fn splits(case: &mut Case, found: &Splits) {
         table.rows.push(row);
     }
     case.table(table);
+    // The full 6x6 is exact for any place of the joint; its diagonal alone must not be.
     let (first, last) = (&found.0[0], &found.0[found.0.len() - 1]);
     case.claim(
         format!("end loads, joint anywhere between {} and {} of the length", first.fraction, last.fraction),
@@ -201,6 +204,7 @@ fn weight(case: &mut Case, found: &Weight) {
         up_hz[0],
         up_hz[1]
     );
+    // Each model against q l⁴/(8 EI) and the frequencies of Rayleigh's beam.
     let heads = ["model", "elastic coordinates", "sag", "f_1 sideways", "f_1 upwards", "f_2 sideways", "f_2 upwards"];
     let mut table = Table::new(caption, &heads);
     for model in models {
@@ -209,6 +213,7 @@ fn weight(case: &mut Case, found: &Weight) {
         table.rows.push(row);
     }
     case.table(table);
+    // Exact for modal links; two parts miss a sixth, and many parts converge.
     let claims = [
         ("own-weight sag, modal link with any number of modes", found.modal_sag_error(), 1e-6),
         ("own-weight sag, two parts: what they do not give exactly", found.sag_error(2), 0.17),

@@ -78,6 +78,7 @@ fn meshes(case: &mut Case, found: &Meshes) {
         found.calculix.provenance,
         p = CALCULIX_POINTS
     ));
+    // Compliance of the tip: NGSolve's whole mesh against CalculiX and against every method here.
     let (truth, theirs) = (&found.ngsolve.C_tip, &found.calculix.C_tip);
     let caption = "Motion of the tip along each load, per unit of it, and the error of each method, all as above; truth: NGSolve.";
     let mut table = Table::new(caption, &["load", "NGSolve [µm, µrad per N, N m]", "CalculiX"]);
@@ -90,6 +91,7 @@ fn meshes(case: &mut Case, found: &Meshes) {
     claim_each(case, "meshed arm, loads at the tip", (by, truth), &found.methods, 1e-7);
     let between = compliance_error(theirs, truth);
     case.stored_claim("meshed arm, loads at the tip: CalculiX against NGSolve", by, between, Bound::AtMost(1e-7));
+    // Sag and frequencies of each model against the same mesh.
     case.table(sag_and_frequencies(found));
     case.text(
         "Two parts carry the weight of a beam at two points. The ball is most of the load and is carried \
@@ -98,6 +100,7 @@ fn meshes(case: &mut Case, found: &Meshes) {
          modal link without modes has static shapes only. Modal links have the sag exactly with any number of \
          modes.",
     );
+    // Modal links have the sag exactly; parts converge with their number.
     let claims = [
         ("sag, modal links with any number of modes", found.modal_sag_error(), 1e-7),
         ("sag, two parts", found.shift_error("2 parts"), 0.015),
@@ -156,6 +159,7 @@ fn frequency_figure(models: &[Model]) -> Figure {
 /// Differences between the sections of beam theory and the meshes, beam by beam.
 fn sections(case: &mut Case, found: &Sections) {
     case.heading("Beam theory against the meshes");
+    // Ends of the beams with both ties, and sections in the middle, where the ends do not matter.
     let mut ends = Table::new(
         "Compliance of the end of each beam from its mesh, over that of beam theory, less one; axes of the beam (x along it, y and z across). Both ends tied rigidly or by the mean of \
          their nodes.",
@@ -188,7 +192,9 @@ fn sections(case: &mut Case, found: &Sections) {
          work. Rigid ties keep the ends from contracting and warping. Ties by the mean spread a torque evenly \
          over the nodes; this is not the shear flow of a box, and it distorts the section near the ends.",
     );
+    // Beam theory away from the ends; a tube has no warping, so its torsion agrees at the ends as well.
     let middle = found.worst_in_the_middle();
+    // A tie by the mean is not the shear flow of a box: this difference must show.
     case.claim("meshed beams, EA and EI in the middle", "beam theory", middle, Bound::AtMost(2e-5));
     let tube_torsion = found.beams[TUBE].end_errors[0][TORSION].abs();
     case.claim("meshed tube in torsion, ends tied rigidly", "beam theory", tube_torsion, Bound::AtMost(1e-7));
@@ -198,6 +204,7 @@ fn sections(case: &mut Case, found: &Sections) {
         found.beams[BOX].end_errors[1][TORSION],
         Bound::AtLeast(0.1),
     );
+    // Reading the files of the reduced beams back.
     let filed = found.worst_file();
     case.claim("files of the reduced beams: compliance", "the same meshes reduced here", filed, Bound::AtMost(1e-7));
 }
@@ -215,6 +222,7 @@ fn ring_down(case: &mut Case, found: &RingDown) {
         1e3 * found.peak_m,
         ring_down::MODES
     );
+    // Error of each run against both truths.
     let heads = ["model", "stepper", "h [ms]", "method", "x", "y", "z", "stepper alone", "model alone"];
     let mut table = Table::new(caption, &heads);
     for run in &found.runs {
@@ -223,6 +231,7 @@ fn ring_down(case: &mut Case, found: &RingDown) {
         let cells = [word(&found.models[run.model].name), word(run.stepper), digits(1e3 * run.step_s, 1)].into_iter();
         table.rows.push(cells.chain(errors.map(error)).collect());
     }
+    // Steppers against error control on the same model, at one step.
     for run in found.runs.iter().filter(|run| run.step_s == STEP_S) {
         let bound = if run.compliant { 0.045 } else { 3e-4 };
         case.claim(
@@ -233,6 +242,7 @@ fn ring_down(case: &mut Case, found: &RingDown) {
         );
     }
     case.table(table);
+    // Parts against modal links, both with error control.
     for (name, model, bound) in [("two", TWO_PARTS, 0.05), ("five", FIVE_PARTS, 3e-3)] {
         let text = format!("three beams, ring-down, {name} parts: model alone");
         let truth = format!("modal links, {} modes", ring_down::MODES);
@@ -248,6 +258,7 @@ fn run_name(found: &RingDown, run: &Run) -> String {
 
 fn ring_down_figure(found: &RingDown) -> Figure {
     let truth = found.truth();
+    // Every DRAWN-th sample: each axis of the tip, then the distance from the truth.
     let curve = |name: &str, look, y: &dyn Fn(usize) -> f64| {
         let drawn = (0..truth.len()).step_by(DRAWN);
         PlotCurve {

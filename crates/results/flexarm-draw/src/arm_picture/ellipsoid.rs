@@ -1,4 +1,6 @@
 //! Ellipsoid of the compliance at the TCP: its image in a view, and its principal axes. World axes.
+//!
+//! Start at [`Ellipsoid::new`]. Not here: the compliance (`flexarm-run`), the arm (`skin.rs`).
 
 use nalgebra::{Matrix2x3, Matrix3, SymmetricEigen, Vector3};
 

@@ -1,4 +1,7 @@
 //! Legend of a picture: axes, colour scale and caption.
+//!
+//! Sizes are multiples of `unit` (pixels); shares are of the maximum deviation. Not here: the arm
+//! itself (`skin.rs`), colour maps (`mesh_picture/color.rs`).
 
 use crate::mesh_picture::draw::{Align, Style, text_width};
 use crate::mesh_picture::{Image, Rgb, View, color};

@@ -1,4 +1,7 @@
 //! Readable numbers with units.
+//!
+//! Arguments are SI (m, rad, m²); texts name their unit. Vectors below `noise`
+//! are written as zero. Not here: numbers of tables and files (`flexarm-settings`).
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,7 @@
 //! Elements shared by the sheets: size, compass, colour bar and labels.
+//!
+//! Positions on the sheet are in pixels from the top left; 3D points in link axes (m). Not here: the
+//! contents of each sheet (`interface_sheet.rs`, `deflection_sheet.rs`, `stress_sheet.rs`).
 
 use nalgebra::Vector3;
 

@@ -1,4 +1,7 @@
 //! Triangles without finite elements: prisms, smooth normals on curved faces, lines at edges.
+//!
+//! Triangles are triples of vertex numbers, counter-clockwise from outside; positions in m. Not here:
+//! faces of elements (`surface.rs`), pixels (`raster.rs`).
 
 use nalgebra::Vector3;
 

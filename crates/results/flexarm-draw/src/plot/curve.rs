@@ -1,4 +1,6 @@
 //! Curves and panels of a plot.
+//!
+//! Plain data in the units of the axes. Not here: drawing (`mod.rs`).
 
 /// Style of a curve.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,4 +1,8 @@
 //! Looks of curves, and their names above the panels.
+//!
+//! Start at [`style_of`] and [`draw_legend`]; the total is black and thick, other curves have colours
+//! of the palette. Sizes in units of the style.
+//! Not here: axes and ticks (`frame.rs`, `ranges.rs`).
 
 use plotters::prelude::*;
 

@@ -1,4 +1,6 @@
 //! Sizes of plots: for the screen, a page, a column of a paper, and a plan.
+//!
+//! Lengths in units of the picture. Not here: colours (`palette.rs`).
 
 /// Sizes in units of the picture.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,6 @@
 //! Opens a recording: checks that the file is in the expected format and picks its reader.
+//!
+//! Start at [`open_recording`]. Not here: the table of formats (`mod.rs`), the readers (`read`).
 
 use std::io::Read;
 use std::path::Path;

@@ -1,4 +1,8 @@
 //! Text that contains `${expressions}` and `$(substitutions)`.
+//!
+//! Start at `Interpreter::text`: a text of one expression keeps its type, a mixed one is joined.
+//! Not here: the value of an expression (`expression`), `$(find ...)` and `$(arg ...)`
+//! (`substitution.rs`).
 
 use super::Interpreter;
 use super::expression::value::Value;

@@ -150,6 +150,8 @@ impl MeshFrame<'_> {
         if faults.is_empty() { Ok(chosen) } else { Err(faults) }
     }
 
+    /// Returns the interface of an entry: its nodes, with the mid-side nodes of their faces, and its
+    /// frame.
     fn one(
         &self,
         job: &ReduceJob,
@@ -177,26 +179,46 @@ impl MeshFrame<'_> {
         if let Some(angle) = entry.rpy.iter().flatten().find(|angle| angle.abs() > std::f64::consts::TAU) {
             return Err(fail(format!("rpy has {angle} rad, more than a turn: angles are in rad, are these degrees?")));
         }
-        // Exactly one position: coordinates, centroid, joint, or by default that of the robot's joint.
+        let X_LI = self.frame(entry, robot, index, (nodes.len(), &centroid)).map_err(fail)?;
+        let tie = entry.tie.or(job.tie).unwrap_or(Tie::Rigid);
+        let interface = Interface { name, X_LI, nodes, tie };
+        Ok(SelectedInterface { interface, selector: selector.clone(), centroid, extent, on_surface, chosen_nodes })
+    }
+
+    /// Returns the frame `X_LI` of an interface from its one position: coordinates, centroid, joint, or
+    /// by default that of the robot's joint.
+    ///
+    /// * `index`: number of the interface in the job, from 0.
+    /// * `nodes`, `centroid`: number of its nodes and their centroid (m, link axes).
+    fn frame(
+        &self,
+        entry: &InterfaceEntry,
+        robot: Option<&UrdfLink>,
+        index: usize,
+        (nodes, centroid): (usize, &Vector3<f64>),
+    ) -> Result<Pose, String> {
+        let name = entry.name.as_deref().unwrap_or_default();
         let turned = |position: Vector3<f64>| {
             let frame = FrameEntry { xyz: (position / self.unit).into(), rpy: entry.rpy.unwrap_or_default() };
             pose(&frame, self.unit)
         };
-        let X_LI = match (entry.xyz, entry.at, &entry.joint) {
+        Ok(match (entry.xyz, entry.at, &entry.joint) {
+            // One of coordinates, centroid and joint.
             (Some(xyz), None, None) => {
                 if xyz.iter().chain(&entry.rpy.unwrap_or_default()).any(|x| !x.is_finite()) {
-                    return Err(fail(format!("its position is {xyz:?}, expected finite numbers")));
+                    return Err(format!("its position is {xyz:?}, expected finite numbers"));
                 }
                 pose(&FrameEntry { xyz, rpy: entry.rpy.unwrap_or_default() }, self.unit)
             }
-            (None, Some(_), None) => turned(centroid),
+            (None, Some(_), None) => turned(*centroid),
             (None, None, Some(joint)) => {
                 let robot = robot.ok_or_else(|| {
                     let (urdf, link) = (Setting::Urdf, Setting::Link);
-                    fail(format!("joint {joint:?} needs a robot: {urdf} FILE {link} NAME, or [urdf] in the job file"))
+                    format!("joint {joint:?} needs a robot: {urdf} FILE {link} NAME, or [urdf] in the job file")
                 })?;
-                robot.joint(joint).map_err(fail)?
+                robot.joint(joint)?
             }
+            // By default the frames of the robot's link: A its origin, B the next joint.
             (None, None, None) => match (robot, index) {
                 (Some(_), 0) => Pose::identity(),
                 (Some(robot), 1) => robot.X_LB,
@@ -204,15 +226,12 @@ impl MeshFrame<'_> {
                     let joints = robot.leading_on().map(|joint| format!("{} {name}=joint:{}", Setting::At, joint.name));
                     let hint = joints.collect::<Vec<_>>();
                     let hint = format!("; at a joint of the link: {}", hint.join(" or "));
-                    return Err(fail(self.no_position(&name, nodes.len(), &centroid) + &hint));
+                    return Err(self.no_position(name, nodes, centroid) + &hint);
                 }
-                (None, _) => return Err(fail(self.no_position(&name, nodes.len(), &centroid))),
+                (None, _) => return Err(self.no_position(name, nodes, centroid)),
             },
-            _ => return Err(fail("it has more than one position: xyz, at and joint exclude each other".into())),
-        };
-        let tie = entry.tie.or(job.tie).unwrap_or(Tie::Rigid);
-        let interface = Interface { name, X_LI, nodes, tie };
-        Ok(SelectedInterface { interface, selector: selector.clone(), centroid, extent, on_surface, chosen_nodes })
+            _ => return Err("it has more than one position: xyz, at and joint exclude each other".into()),
+        })
     }
 
     fn no_position(&self, name: &str, nodes: usize, centroid: &Vector3<f64>) -> String {

@@ -53,6 +53,10 @@ fn units_of(job: &ReduceJob) -> UnitSystem {
     job.units.unwrap_or(UnitSystem::SI)
 }
 
+/// Returns plan and mesh of a reduction, from a job and its mesh as [`read`] returns it.
+///
+/// # Errors
+/// All faults of units, materials, names and interfaces together; those of the robot's link.
 pub(super) fn prepare(
     job: &ReduceJob,
     (mut file, mut warnings): (MeshFile, Vec<String>),
@@ -106,15 +110,25 @@ pub(super) fn prepare(
     let mut plan = plan(job, &file, units, &chosen, &materials);
     plan.assembly.quadrature = quadrature(job, &file)?;
     file.mesh = file.mesh.transformed(&X_LM);
-    // The mass of the robot's link beyond that of the mesh, fixed to the two parts.
-    if let (Some(robot), Some(entry)) = (robot, job.urdf.as_ref().filter(|entry| entry.rest)) {
-        let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
-        let mesh = mass_properties(&file.mesh, &densities)
-            .map_err(|error| LinkError::content(&job.mesh, error.to_string()))?;
-        let along = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
-        plan.attached = robot.rest(&mesh, &along).map_err(|what| LinkError::content(&entry.file, what))?.into();
-    }
+    attach_rest(job, &file, robot, &mut plan)?;
     Ok(Prepared { plan, file, units, chosen, materials, findings })
+}
+
+/// Adds the mass of the robot's link beyond that of the mesh, fixed to the two parts, if the job
+/// requests it.
+fn attach_rest(
+    job: &ReduceJob,
+    file: &MeshFile,
+    robot: Option<&UrdfLink>,
+    plan: &mut LinkPlan,
+) -> Result<(), LinkError> {
+    let (Some(robot), Some(entry)) = (robot, job.urdf.as_ref().filter(|entry| entry.rest)) else { return Ok(()) };
+    let densities: Vec<f64> = file.mesh.regions.iter().map(|r| r.material.map_or(0.0, |m| m.rho)).collect();
+    let mesh =
+        mass_properties(&file.mesh, &densities).map_err(|error| LinkError::content(&job.mesh, error.to_string()))?;
+    let p_AoBo_L = plan.interfaces[1].X_LI.translation.vector - plan.interfaces[0].X_LI.translation.vector;
+    plan.attached = robot.rest(&mesh, &p_AoBo_L).map_err(|what| LinkError::content(&entry.file, what))?.into();
+    Ok(())
 }
 
 /// Merges coincident nodes.

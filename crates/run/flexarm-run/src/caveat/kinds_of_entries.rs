@@ -1,4 +1,7 @@
 //! Catalogue of caveats about strengths, gauges, guides and calibrations; part of [`super::kinds`].
+//!
+//! Words only, one constant per kind: code, message, unit, help. Not here: thresholds and rules (the
+//! other files of this folder), kinds of use (`kinds_of_use.rs`).
 
 use super::FindingKind;
 

@@ -1,4 +1,7 @@
 //! Catalogue of caveats about motions, loads, balancers and closed loops; part of [`super::kinds`].
+//!
+//! Words only, one constant per kind: code, message, unit, help. Not here: thresholds and rules (the
+//! other files of this folder), kinds of entries (`kinds_of_entries.rs`).
 
 use super::FindingKind;
 

@@ -25,6 +25,7 @@ use flexarm_settings::written::{markdown as markdown_text, markdown_row};
 use crate::arm::options::Outputs;
 use crate::error::Error;
 use crate::run::headline::{self, rounded};
+use crate::run::monitor::tool_path::PathFigures;
 use crate::run::record::FIGURES_FOLDER;
 use crate::run::settling::within;
 use crate::run::summary::{LinkStressFigures, StrainGaugeFigures, StressPointFigures, Summary};
@@ -228,6 +229,18 @@ pub fn stress_figures(links: &[LinkStressFigures], is_run: bool) -> Vec<Figure> 
     figures.collect()
 }
 
+/// Returns the figures of the error across a path.
+fn across_figures(path: &PathFigures) -> [Figure; 3] {
+    let peak = format!("maximum, at {:.3} s; RMS {} mm", path.t_across_peak_s, mm(path.across_rms_m));
+    let [x, y, z] = path.offset_m.map(mm);
+    let shifted = format!("maximum, with the workpiece shifted by ({x}, {y}, {z}) mm");
+    [
+        Figure::new("error across the path", mm(path.across_peak_m), "mm", peak),
+        Figure::new("across, work shifted", mm(path.left_m), "mm", shifted),
+        Figure::new("corner overshoot", mm(path.corner_overshoot_m), "mm", "beyond the static deflection"),
+    ]
+}
+
 /// Returns the figures of the TCP.
 fn tool_figures(summary: &Summary) -> Vec<Figure> {
     let mut rows = Vec::new();
@@ -260,14 +273,7 @@ fn tool_figures(summary: &Summary) -> Vec<Figure> {
         "mm",
         "maximum distance from the path while moving",
     ));
-    if let Some(path) = &summary.path {
-        let note = format!("maximum, at {:.3} s; RMS {} mm", path.t_across_peak_s, mm(path.across_rms_m));
-        rows.push(Figure::new("error across the path", mm(path.across_peak_m), "mm", note));
-        let [x, y, z] = path.offset_m.map(mm);
-        let note = format!("maximum, with the workpiece shifted by ({x}, {y}, {z}) mm");
-        rows.push(Figure::new("across, work shifted", mm(path.left_m), "mm", note));
-        rows.push(Figure::new("corner overshoot", mm(path.corner_overshoot_m), "mm", "beyond the static deflection"));
-    }
+    rows.extend(summary.path.iter().flat_map(across_figures));
     // At rest, and after moves.
     rows.push(Figure::new("static sag at the start", mm(tcp.static_sag_m), "mm", ""));
     rows.push(Figure::new("error at the end", mm(tcp.end_m), "mm", ""));

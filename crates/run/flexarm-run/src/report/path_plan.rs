@@ -1,4 +1,6 @@
 //! Plan of the TCP path with the magnified error across it. World axes, m; the drawing in mm.
+//!
+//! Start at [`path_plan`]. Not here: the figures of the path (`figures.rs`), curves (`curves.rs`).
 
 use flexarm_draw::{CurveLook, Panel, PlotCurve, plan_plot};
 use nalgebra::{Matrix3, Vector3};

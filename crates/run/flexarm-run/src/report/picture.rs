@@ -1,4 +1,6 @@
-//! The arm at the time of the maximum error, from two sides. Not here: rendering (`flexarm-draw`).
+//! The arm at the time of the maximum error, from two sides.
+//!
+//! Without the feature `png` there are no pictures. Not here: rendering (`flexarm-draw`).
 
 use flexarm_log::Trace;
 

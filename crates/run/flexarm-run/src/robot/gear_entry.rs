@@ -139,10 +139,42 @@ pub(crate) fn hysteresis(
 ) -> Result<GearHysteresis, String> {
     let loss = one_of([("loss", entry.loss), ("loss_arcmin", entry.loss_arcmin)], ARCMIN)?;
     let loss = loss.ok_or("hysteresis needs loss (rad) or loss_arcmin: the width of its loop without torque")?;
+    let elastic = elastic_part(entry, stiffness, curve, loss)?;
+    // Friction of all sliders together, and how it grows with the deflection of first loading.
+    let friction = elastic.torque(0.5 * loss);
+    if friction <= 0.0 {
+        return Err(format!(
+            "hysteresis has a loss of {loss:e} rad within the play, where no torque holds the gear back: give a \
+             larger loss, or less backlash"
+        ));
+    }
+    let reach = match entry.reach {
+        None => 0.5 * loss,
+        Some(reach) if reach.is_finite() && reach > 0.0 => reach,
+        Some(reach) => return Err(format!("hysteresis has reach {reach}, expected a positive deflection in rad")),
+    };
+    let sliders = match entry.sliders {
+        None => SLIDERS,
+        Some(n) if (1..=MAX_SLIDERS).contains(&n) => n as usize,
+        Some(n) => return Err(format!("hysteresis has {n} sliders, expected 1 to {MAX_SLIDERS}")),
+    };
+    let sliders = Hysteresis::even_sliders(friction, reach, sliders);
+    Ok(GearHysteresis { law: Hysteresis { elastic, sliders }, loss })
+}
+
+/// Returns the elastic part of a hysteresis: the curve or the stiffness, or a curve that is softer
+/// around zero for a given lost motion.
+///
+/// * `loss`: width of the loop at zero torque (rad).
+fn elastic_part(
+    entry: &HysteresisEntry,
+    stiffness: f64,
+    curve: Option<&TorqueCurve>,
+    loss: f64,
+) -> Result<TorqueCurve, String> {
     let lost_motion =
         one_of([("lost_motion", entry.lost_motion), ("lost_motion_arcmin", entry.lost_motion_arcmin)], ARCMIN)?;
-    // Elastic part: the curve or the stiffness, or softer around zero for a given lost motion.
-    let elastic = match (curve, lost_motion, entry.rated_torque) {
+    Ok(match (curve, lost_motion, entry.rated_torque) {
         (Some(_), Some(_), _) => {
             return Err("hysteresis with lost_motion takes a stiffness: backlash and a curve say the same".into());
         }
@@ -173,27 +205,7 @@ pub(crate) fn hysteresis(
         }
         (Some(curve), None, _) => curve.clone(),
         (None, None, _) => TorqueCurve::straight(stiffness),
-    };
-    // Friction of all sliders together, and how it grows with the deflection of first loading.
-    let friction = elastic.torque(0.5 * loss);
-    if friction <= 0.0 {
-        return Err(format!(
-            "hysteresis has a loss of {loss:e} rad within the play, where no torque holds the gear back: give a \
-             larger loss, or less backlash"
-        ));
-    }
-    let reach = match entry.reach {
-        None => 0.5 * loss,
-        Some(reach) if reach.is_finite() && reach > 0.0 => reach,
-        Some(reach) => return Err(format!("hysteresis has reach {reach}, expected a positive deflection in rad")),
-    };
-    let sliders = match entry.sliders {
-        None => SLIDERS,
-        Some(n) if (1..=MAX_SLIDERS).contains(&n) => n as usize,
-        Some(n) => return Err(format!("hysteresis has {n} sliders, expected 1 to {MAX_SLIDERS}")),
-    };
-    let sliders = Hysteresis::even_sliders(friction, reach, sliders);
-    Ok(GearHysteresis { law: Hysteresis { elastic, sliders }, loss })
+    })
 }
 
 /// Gear effects other than elasticity and hysteresis, assigned to their elements.

@@ -1,4 +1,7 @@
 //! Entries `[[inertial]]` of a robot file: masses and centres of mass of rigid links.
+//!
+//! Start at [`weigh`]; link axes, kg, m. Not here: flexible links, whose mass is that of their file
+//! (`link_entry.rs`).
 
 use flexarm_files::{Source, TextFileError as RobotFileError};
 use flexarm_kinematics::Mechanism;

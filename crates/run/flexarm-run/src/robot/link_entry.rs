@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use flexarm_fem::{BeamLink, ReducedLink};
 use flexarm_files::{Source, TextFileError as RobotFileError, named_file};
 use flexarm_flexlink::{FlexibleLink, LinkForm, Parts, SubstitutionError, distal_joint, spring_stiffness};
-use flexarm_kinematics::{ElasticAngles, Mechanism, Pose};
+use flexarm_kinematics::{ElasticAngles, Joint, Mechanism, Pose};
 use flexarm_linkmaker::reduce::STRESS_FILE;
 use flexarm_settings::{Words, known_names};
 use flexarm_stepping::Damping;
@@ -94,6 +94,23 @@ pub(crate) struct DampingEntry {
     pub rayleigh: Option<[f64; 2]>,
 }
 
+/// Returns the joint at the far end of the link: the one of the entry, or the only one.
+fn far_joint<'m>(
+    entry: &'m FlexibleLinkEntry,
+    mechanism: &'m Mechanism,
+    source: &Source,
+) -> Result<&'m Joint, RobotFileError> {
+    let named = entry.distal.as_ref().map(|d| d.get_ref().as_str());
+    distal_joint(mechanism, entry.link.get_ref(), named).map_err(|e| {
+        if let SubstitutionError::UnknownLink { link, known } = &e {
+            let known = known_names(link, known);
+            let message = format!("flexible link {link:?} is not a link of the robot; its links are {known}");
+            return source.error(entry.link.span(), message);
+        }
+        source.error(entry.distal.as_ref().map_or(entry.link.span(), Spanned::span), e.to_string())
+    })
+}
+
 /// Builds the flexible link of an entry.
 pub(crate) fn flexible_link(
     entry: &FlexibleLinkEntry,
@@ -112,15 +129,7 @@ pub(crate) fn flexible_link(
     let angles = angles_of(entry, source)?;
     let damping = damping_of(entry.damping.as_ref(), source);
     let damping = keep(damping.map_err(Error::from), faults).unwrap_or(Damping::Modal(0.0));
-    let distal_name = entry.distal.as_ref().map(|d| d.get_ref().as_str());
-    let distal = distal_joint(mechanism, name, distal_name).map_err(|e| {
-        if let SubstitutionError::UnknownLink { link, known } = &e {
-            let known = known_names(link, known);
-            let message = format!("flexible link {link:?} is not a link of the robot; its links are {known}");
-            return source.error(entry.link.span(), message);
-        }
-        source.error(entry.distal.as_ref().map_or(entry.link.span(), Spanned::span), e.to_string())
-    })?;
+    let distal = far_joint(entry, mechanism, source)?;
 
     // Stiffness and parts, from a file or a beam.
     let (reduced, parts, beam) = match (&entry.reduced, &entry.beam) {

@@ -1,4 +1,6 @@
-//! Events of a run, for recordings and reports. Not here: caveats about the result (`figures`).
+//! Events of a run, for recordings and reports.
+//!
+//! Start at `RunLoop::events`; times in s. Not here: caveats about the result (`figures`).
 
 use flexarm_analysis::TcpMetrics;
 use flexarm_log::{Event, EventKind};

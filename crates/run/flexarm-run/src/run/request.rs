@@ -1,4 +1,6 @@
-//! Request of a run, and its result. Not here: options of the stepper and the log (`RunOptions`).
+//! Request of a run, and its result.
+//!
+//! Start at [`RunRequest`] and [`Run`]. Not here: options of the stepper and the log (`RunOptions`).
 
 use std::ops::ControlFlow;
 

@@ -141,6 +141,7 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
     let mut names = Vec::new();
     for variant in variants {
         let name = folder_name(&variant.label);
+        // Empty, hidden, or taken on a file system that ignores case.
         if name.is_empty() || name.starts_with('.') || !taken.insert(name.to_lowercase()) {
             let message = format!(
                 "the label {label:?} names two runs of the study, or none: give each {} a name=... of its own",
@@ -149,6 +150,7 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
             );
             return Err(Error::Value(message));
         }
+        // Taken by a file of the study.
         if files_of_a_run().any(|file| file == name.to_lowercase()) {
             let message = format!(
                 "the label {label:?} is the name of a file of the study: give its {} another name=...",
@@ -157,6 +159,7 @@ fn folders(variants: &[Variant]) -> Result<Vec<String>, Error> {
             );
             return Err(Error::Value(message));
         }
+        // Too long for a file system.
         if name.len() > LONGEST_NAME {
             let message = format!(
                 "the label {label:?} has {letters} letters, at most {LONGEST_NAME} make a folder: give its {} a \

@@ -232,7 +232,7 @@ impl Fit<'_> {
     /// Predicts the readings of each fold from the other folds; readings at one pose are in one
     /// fold.
     fn held_out(&self, solution: &Solution, before: &[f64], folds: usize) -> Option<HeldOut> {
-        // Number of the pose of each row; prior knowledge has none and stands alone.
+        // Number of the pose of each row; a row of prior knowledge is a pose of its own.
         let mut poses: Vec<&[f64]> = Vec::new();
         let mut pose_of_row = Vec::new();
         for reading in &self.measurements.readings {

@@ -111,7 +111,7 @@ pub fn rigid_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Pose> {
 /// Returns the rotation R that minimises `Σ |R p_k - q_k|²`; `None` if all vectors are collinear.
 ///
 /// ```text
-/// Σ p qᵀ = U S Vᵀ,   R = V D Uᵀ,   D = 1 but for ±1 at the smallest singular value, so that det R = 1
+/// Σ p qᵀ = U S Vᵀ,   R = V D Uᵀ,   D = diag(1, 1, ±1), smallest singular value last, so that det R = 1
 /// ```
 pub(crate) fn rotation_fit(from: &[Vector3<f64>], to: &[Vector3<f64>]) -> Option<Rotation3<f64>> {
     let H: Matrix3<f64> = from.iter().zip(to).map(|(p, q)| p * q.transpose()).sum();

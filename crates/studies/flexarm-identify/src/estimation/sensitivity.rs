@@ -362,25 +362,7 @@ fn explicit(
 ) -> (DMatrix<f64>, DMatrix<f64>) {
     let n = here.K.nrows();
     match effect {
-        Effect::Stiffness(places) => {
-            let mut dK = DMatrix::zeros(n, n);
-            for place in places {
-                if let Some((places, coupled)) = plant.coupled_stiffness_slope(place.spring) {
-                    for (a, i) in places.iter().enumerate() {
-                        places.iter().enumerate().for_each(|(b, j)| dK[(*i, *j)] += coupled[(a, b)]);
-                    }
-                    continue;
-                }
-                let element = &plant.elements[place.spring];
-                let (first, size) = (plant.offset(element), element.size);
-                let mut block = dK.view_mut((first, first), (size, size));
-                match plant.vibration_slope(place.spring, q.as_slice()) {
-                    Some(slope) => block[(0, 0)] += slope,
-                    None => block += slope_of(&element.K, place.coordinate),
-                }
-            }
-            (dK, DMatrix::zeros(n, n))
-        }
+        Effect::Stiffness(places) => (stiffness_slope(plant, places, q.as_slice(), n), DMatrix::zeros(n, n)),
         Effect::Entry { spring, row, column, factor, .. } => {
             let element = &plant.elements[*spring];
             let (first, size) = (plant.offset(element), element.size);
@@ -415,4 +397,26 @@ fn explicit(
             (heavier.K - &here.K, heavier.M - &here.M)
         }
     }
+}
+
+/// Computes the derivative, n×n, of the stiffness with respect to the logarithm of a factor on the
+/// given coordinates of springs.
+fn stiffness_slope(plant: &Plant, places: &[SpringPart], q: &[f64], n: usize) -> DMatrix<f64> {
+    let mut dK = DMatrix::zeros(n, n);
+    for place in places {
+        if let Some((places, coupled)) = plant.coupled_stiffness_slope(place.spring) {
+            for (a, i) in places.iter().enumerate() {
+                places.iter().enumerate().for_each(|(b, j)| dK[(*i, *j)] += coupled[(a, b)]);
+            }
+            continue;
+        }
+        let element = &plant.elements[place.spring];
+        let (first, size) = (plant.offset(element), element.size);
+        let mut block = dK.view_mut((first, first), (size, size));
+        match plant.vibration_slope(place.spring, q) {
+            Some(slope) => block[(0, 0)] += slope,
+            None => block += slope_of(&element.K, place.coordinate),
+        }
+    }
+    dK
 }

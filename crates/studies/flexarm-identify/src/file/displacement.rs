@@ -3,7 +3,7 @@
 //! A row of a table replaces what the entry says for all rows. Values are along a direction or along
 //! the axes x, y, z of the world or of an instrument; empty cells are not measured.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use flexarm_run::Error;
 use flexarm_settings::Place;
@@ -107,12 +107,7 @@ impl Reader<'_> {
     }
 
     /// Returns the displacement in a row of a table; the entry gives what the row does not.
-    fn in_row<'a>(
-        &self,
-        e: &DisplacementEntry,
-        file: &PathBuf,
-        row: TableRow<'a>,
-    ) -> Result<FileDisplacement<'a>, Error> {
+    fn in_row<'a>(&self, e: &DisplacementEntry, file: &Path, row: TableRow<'a>) -> Result<FileDisplacement<'a>, Error> {
         let value = match (row.get("d"), row.filled(["dx", "dy", "dz"])) {
             (Some(d), None) => Some(Measured::One(d)),
             (None, three) => three.map(Measured::Three),

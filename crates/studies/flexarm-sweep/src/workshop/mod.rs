@@ -251,7 +251,7 @@ impl Workshop {
             Values::Spread(distribution) => vec![ParameterValue::Number(distribution.quantile(0.5))],
             Values::Derived(_) => vec![ParameterValue::Number(1.0)],
         };
-        // Of a distribution the median, of an expression any number.
+        // A distribution is checked at its median, an expression at any number.
         for value in &listed {
             match target {
                 Target::File(which) => match value {

@@ -1,4 +1,6 @@
 //! Settings of SPOOK and its entry in the registry of steppers; Σ, Υ and τ are those of the module.
+//!
+//! Start at [`SpookSettings`]. Not here: the equations (the parent module), the step (`solve.rs`).
 
 use std::sync::Arc;
 

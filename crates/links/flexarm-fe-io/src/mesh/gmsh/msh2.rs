@@ -1,4 +1,6 @@
 //! Sections of MSH 2: counts are text, the rest is text or binary.
+//!
+//! Start at [`nodes`] and [`elements`]. Not here: MSH 4 (`msh4.rs`), node order (`shapes.rs`).
 
 use nalgebra::Vector3;
 

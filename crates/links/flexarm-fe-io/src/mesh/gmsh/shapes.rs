@@ -1,4 +1,7 @@
 //! Element types of Gmsh: dimension, number of nodes, and conversion to our node order.
+//!
+//! Start at [`shape`]. Our order: corners, then mid-side nodes in the order of the edges. Not here:
+//! sections of the file (`msh2.rs`, `msh4.rs`).
 
 use flexarm_fem::mesh::ElementKind;
 

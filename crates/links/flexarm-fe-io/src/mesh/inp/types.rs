@@ -1,4 +1,6 @@
 //! Element types of Abaqus and CalculiX.
+//!
+//! Start at [`class`]. Not here: the lines of a deck (`deck.rs`), faces (`flexarm_fem::mesh`).
 
 use flexarm_fem::beam::BeamTheory;
 use flexarm_fem::mesh::ElementKind;

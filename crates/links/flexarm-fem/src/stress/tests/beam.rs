@@ -1,4 +1,7 @@
 //! Stress of beams against solid meshes, equilibrium and handbooks.
+//!
+//! Truths: the solid mesh of the same bar, equilibrium of the shear flow, torsion constants of
+//! handbooks. Section axes: x along the beam, y and z across. Not here: solids (`stress/tests.rs`).
 
 use flexarm_spatial::Pose;
 use nalgebra::{DVector, Rotation3, Vector3, Vector6};

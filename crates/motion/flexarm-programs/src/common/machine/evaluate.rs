@@ -80,6 +80,7 @@ impl<D: Dialect> Machine<'_, D> {
         if let Value::Outside(what) = at {
             return Ok(Value::Outside(what));
         }
+        // Index as the language counts; system variables without a value are outside the program.
         let at = at.count(span)?;
         let index = usize::try_from(at - D::FIRST_INDEX).ok();
         let is_system = matches!(&base.kind, Kind::Name(name) if name.starts_with('$'));
@@ -94,6 +95,7 @@ impl<D: Dialect> Machine<'_, D> {
                 return fail(base.span, format!("a list is expected before an index, this is {kind}"));
             }
         };
+        // No value: outside for a system variable, otherwise an error.
         match found {
             Some(Value::Nothing) | None if is_system => {
                 Ok(Value::Outside(format!("`{}[{at}]`", self.recorder.excerpt(base.span)).into()))

@@ -1,4 +1,7 @@
 //! Operators on numbers, truth values and texts.
+//!
+//! Start at [`combine`]; indexing, calls and frames are in `evaluate.rs`. Errors have the span of the
+//! operand.
 
 use super::LARGEST;
 use crate::common::tree::Operator;
@@ -22,6 +25,7 @@ pub(super) fn equal(a: &Value, b: &Value) -> bool {
 /// Applies an operator to numbers, truth values or texts.
 pub(super) fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2], span: Span) -> Result<Value> {
     use Operator::*;
+    // Truth values: comparison for equality, then logic.
     match operator {
         Equal | Unequal => {
             for (value, side) in [a, b].into_iter().zip(sides) {
@@ -34,6 +38,7 @@ pub(super) fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2]
         Either => return Ok(Value::Flag(a.flag(sides[0])? != b.flag(sides[1])?)),
         _ => {}
     }
+    // Texts are joined; sums, products and quotients of whole numbers stay whole.
     if let (Add, Value::Text(a), Value::Text(b)) = (operator, a, b) {
         return Ok(Value::Text(format!("{a}{b}").chars().take(LARGEST).collect::<String>().into()));
     }
@@ -42,6 +47,7 @@ pub(super) fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2]
     {
         return result;
     }
+    // All else is arithmetic of numbers.
     let (x, y) = (a.number(sides[0])?, b.number(sides[1])?);
     let number = match operator {
         Add => x + y,

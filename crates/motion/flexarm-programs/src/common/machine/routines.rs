@@ -11,7 +11,7 @@ use crate::common::tree::{Action, Argument, Expr, Kind, Routine, Statement};
 use crate::common::value::Value;
 use crate::common::{Result, Span, fail};
 
-/// Parameters that return values, each with the argument that takes its value.
+/// Parameters that return values, with the arguments that take them.
 type Returned = Vec<(Rc<str>, Expr)>;
 
 impl<D: Dialect> Machine<'_, D> {

@@ -53,16 +53,19 @@ impl Standard {
         let pose = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), R);
         let joint = |p: Vector3<f64>| Step::To(MoveKind::Joint, pose(p));
         let line = |p: Vector3<f64>| Step::To(MoveKind::Line, pose(p));
+        // P2 to P5 in the test plane.
         let corner = |y: f64, d: f64| centre + Vector3::new(d, y, -d) * (0.5 * side * TOWARDS_CORNER);
         let corners = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
         let mut steps = vec![joint(centre)];
         for _ in 0..repeats {
             match self {
+                // P5 to P2, then P1 in the centre, with a rest at each.
                 Self::Iso9283Poses => {
                     for p in corners.iter().rev().chain([&centre]) {
                         steps.extend([line(*p), Step::Rest(REST)]);
                     }
                 }
+                // The square P2 to P5, then the large and the small circle in the test plane.
                 Self::Iso9283Paths => {
                     steps.extend(corners.iter().chain([&corners[0]]).map(|p| line(*p)));
                     let (u, v) = (Vector3::y(), Vector3::new(1.0, 0.0, -1.0).normalize());
@@ -70,6 +73,7 @@ impl Standard {
                         steps.extend(circle(centre, 0.5 * part * side, u, v, &pose));
                     }
                 }
+                // Circles in the three coordinate planes, each in both directions.
                 Self::Circularity => {
                     let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
                     for (u, v) in [(x, y), (y, z), (z, x)] {
@@ -77,6 +81,7 @@ impl Standard {
                         steps.extend(circle(centre, 0.5 * side, u, -v, &pose));
                     }
                 }
+                // Both ends of a stroke along each axis, with a rest at each.
                 Self::Settle => {
                     for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
                         for p in [centre + axis * (0.5 * side), centre - axis * (0.5 * side)] {

@@ -1,4 +1,7 @@
 //! TCP error relative to the rigid twin, at every sample and as figures.
+//!
+//! Frames: W world, T the TCP; the error is flexible minus rigid. Not here: figures of the path
+//! (`tool_path.rs`), settling (`settling.rs`).
 
 use flexarm_analysis::{ErrorSample, LongRecord, PathFrame, tcp_error};
 use flexarm_kinematics::{Frame, Pose};
