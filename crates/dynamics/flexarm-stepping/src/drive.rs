@@ -114,6 +114,7 @@ impl TorqueCurve {
                 ));
             }
         }
+        // The end pieces are continued, so they must rise.
         let n = points.len();
         let slope = |a: [f64; 2], b: [f64; 2]| (b[1] - a[1]) / (b[0] - a[0]);
         if slope(points[0], points[1]) <= 0.0 || slope(points[n - 2], points[n - 1]) <= 0.0 {

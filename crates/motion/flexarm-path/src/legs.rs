@@ -134,6 +134,7 @@ impl<'m> Legs<'m> {
     ) -> Result<Vec<Leg>, Box<Finding>> {
         let mut legs: Vec<Leg> = Vec::new();
         while let Some(Item::Move(of)) = items.get(*k) {
+            // Neighbouring spline moves form one leg.
             let group = spline_group(items, *k);
             if group.is_empty() {
                 *k += 1;

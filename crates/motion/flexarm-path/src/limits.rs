@@ -78,6 +78,7 @@ impl<'a> Limits<'a> {
             let [first, last] = piece.stations;
             for k in first..=last {
                 let Station { s, q, d, before, after } = &route.stations[k];
+                // Second and third derivatives jump at a station: take those of the piece.
                 let dd = if k == first { after } else { before };
                 let ddd = self.rise.map(|_| route.joints(if k == first { k } else { k - 1 }, *s).1);
                 let tool = piece.tool.get(k - first).map(|tool| [tool.V, tool.A]);

@@ -211,6 +211,7 @@ fn corner(a: &Leg, b: &Leg, jerks: bool) -> Corner {
     if let (LegPath::Tool(way), LegPath::Tool(next)) = (&a.way, &b.way)
         && way.frame.X_BF == next.frame.X_BF
     {
+        // Unit tangents and curvatures where the two paths meet.
         let (end, start) = (way.curve.at(a.length), next.curve.at(0.0));
         if (end.V - start.V).norm() <= ALIGNED {
             return match (jerks && (end.A - start.A).norm() > CURVED, a.of.blend) {

@@ -132,6 +132,7 @@ impl Leg<'_> {
             );
             return Err(PlanError::Invalid { number: Some(number), message });
         }
+        // Spline through the points over unit time, at rest at both ends.
         let (points, weights, moving) = self.points();
         let u = via::passing_times(&points, &weights).map_err(|via| PlanError::repeated_point(number, via))?;
         let unit_curve = |i: usize| {
@@ -140,6 +141,7 @@ impl Leg<'_> {
         };
         let unit: Vec<Curve> = (0..self.joints.len()).map(unit_curve).collect();
 
+        // Duration as given, or the shortest within the limits.
         let duration = match planned.duration {
             Some(duration) => duration,
             None => {

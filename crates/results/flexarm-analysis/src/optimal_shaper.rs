@@ -143,6 +143,7 @@ impl Shaper {
     }
 }
 
+/// Checks that the numbers are positive and in range, and the delay not too long for the search.
 fn check(modes: &[ShapedMode], delay_s: f64, band: f64) -> Result<(), ShaperError> {
     let wrong = |what, found, expected| Err(ShaperError::Value { what, found, expected });
     if modes.is_empty() {

@@ -120,11 +120,13 @@ pub(super) fn shaped(arm: &Arc<Arm>, scenario: &Scenario, shaping: Shaping) -> R
 fn through(shaper: &Shaper, motion: &Trajectory) -> Result<Trajectory, Error> {
     let m = motion.joints().len();
     let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+    // Instants from the start to the end of the last copy.
     let total = motion.duration() + shaper.delay_s();
     let n = (total / SAMPLE_S).ceil() as usize;
     let times: Vec<f64> = (0..=n).map(|k| total * k as f64 / n as f64).collect();
     let mut joints: Vec<JointKnots> =
         motion.joints().iter().map(|name| JointKnots { name: name.clone(), ..JointKnots::default() }).collect();
+    // Weighted sum of the delayed motions at each instant.
     for t in &times {
         let mut sum = vec![[0.0; 3]; m];
         for (delay, part) in &shaper.copies {

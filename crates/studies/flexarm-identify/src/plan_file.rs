@@ -418,6 +418,7 @@ fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) 
     let read = if gauges { ",ux,uy,uz,d" } else { ",dx,dy,dz" };
     let joints: Vec<String> = answer.joints.iter().map(|joint| csv_field(joint)).collect();
     let mut out = format!("{},fx,fy,fz{lever}{point}{read}\n", joints.join(","));
+    // Joints in degrees or mm, forces in N, lengths in mm; the readings stay empty.
     for pose in &answer.poses {
         let of = |(q, slides): (&f64, &bool)| format!("{:.4}", if *slides { 1e3 * q } else { q.to_degrees() });
         let joints: Vec<String> = pose.joints.iter().zip(slides).map(of).collect();

@@ -303,6 +303,7 @@ impl Reader<'_> {
             let text = format!("{a} nodes, {b} directions, {c} amplitudes: expected equal numbers of at least two");
             return Err(self.error(site, text));
         }
+        // The scale of the amplitudes is arbitrary, so only their direction counts.
         let amplitudes = DVector::from_column_slice(amplitudes);
         if !(amplitudes.norm().is_finite() && amplitudes.norm() > 0.0) {
             return Err(self.error(&e.amplitudes, "amplitudes: expected finite numbers that are not all zero"));

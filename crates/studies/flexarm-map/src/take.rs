@@ -193,6 +193,7 @@ impl<'a> Worker<'a> {
                     self.labels.push(PoseLabel { place, direction: 0, branch: 0 });
                 }
             }
+            // Poses are answered in batches, so that memory stays bounded.
             if self.labels.len() >= MAX_WAITING {
                 self.answer(&mut taken, go_on);
             }

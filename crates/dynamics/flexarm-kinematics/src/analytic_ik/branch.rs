@@ -166,12 +166,14 @@ impl Sides {
         if side.norm() < 1e-6 {
             return sides;
         }
+        // Front: the side of axis 2, or else of the centre, across the first two axes.
         let (foot, shoulder) = feet(&axes[0], &axes[1]);
         let floor = 1e-6 * reach;
         let first = |values: &[f64]| values.iter().copied().find(|v| v.abs() > floor).unwrap_or(1.0).signum();
         let front = side.normalize();
         let center = if let Kernel::Wrist(k) = kernel { k.center - axes[0].o } else { Vector3::zeros() };
         sides.front = front * first(&[front.dot(&(shoulder - foot)), front.dot(&center)]);
+        // Up: along axis 1 from the base to the foot of axis 2, or else against gravity.
         let up = axes[0].h;
         let height = if reversed { 0.0 } else { up.dot(&foot) };
         let up = up * first(&[height, up.dot(&up_W)]);

@@ -297,12 +297,14 @@ struct RecognisedArm {
 fn recognise(chain: &Chain, frame: &str) -> Result<RecognisedArm, NoAnalyticIk> {
     let from_tool = Lines::new(chain, true);
     let from_base = Lines::new(chain, false);
+    // Three axes that meet at one point, at the tool or at the base.
     for lines in [&from_base, &from_tool] {
         if let Some((kernel, form, deviation)) = lines.wrist() {
             let class = if lines.reversed { ArmClass::SphericalShoulder(form) } else { ArmClass::SphericalWrist(form) };
             return Ok(RecognisedArm { class, kernel, reversed: lines.reversed, deviation });
         }
     }
+    // Three neighbouring parallel axes, joints 2 to 4 first.
     for start in [1, 0] {
         for lines in [&from_base, &from_tool] {
             if let Some((kernel, meeting, deviation)) = lines.three_parallel(start) {
@@ -312,6 +314,7 @@ fn recognise(chain: &Chain, frame: &str) -> Result<RecognisedArm, NoAnalyticIk> 
             }
         }
     }
+    // No class: say how far the arm is from each.
     let apart = |lines: &Lines| lines.meeting_point().map_or(f64::INFINITY, |(_, apart)| apart);
     let spread = |i: usize| from_base.angle(i, i + 1).max(from_base.angle(i, i + 2));
     Err(NoAnalyticIk::NoClass {
@@ -382,10 +385,12 @@ impl Lines {
         if apart > AXIS_TOLERANCE || self.parallel(3, 4).is_some() || self.parallel(4, 5).is_some() {
             return None;
         }
+        // The last three axes meet: move their points to the centre.
         let mut axes = self.axes;
         for axis in &mut axes[3..] {
             axis.o = center;
         }
+        // First form that the other axes match; their small deviation from it is removed.
         let (form, deviation) = if let Some(angle) = self.parallel(1, 2) {
             axes[2].h = axes[1].h * axes[1].h.dot(&axes[2].h).signum();
             (PositionForm::Parallel23, angle)

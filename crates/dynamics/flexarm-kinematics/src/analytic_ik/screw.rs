@@ -139,6 +139,7 @@ impl Chain {
                 break;
             }
             let J = self.jacobian(q);
+            // First step that at least halves the weighted residual.
             let Some((trial, next)) = self
                 .newton_step(&J, &error)
                 .into_iter()

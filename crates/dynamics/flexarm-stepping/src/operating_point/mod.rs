@@ -83,6 +83,7 @@ impl OperatingPoint {
     pub fn new(plant: Plant, tool: Frame) -> Self {
         let (n, nv) = (plant.model.n_elastic(), plant.model.nv());
         let K = plant.stiffness();
+        // Factor of the springs; there is none if their stiffness is not positive definite.
         let mut rest = Factor::new(n);
         let stiff = n > 0 && rest.compute(K.as_slice()) == 1.0;
         Self {

@@ -270,6 +270,7 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
         let interfaces = ('A'..='Z').zip(picks).map(|(name, picks)| Interface { name: name.into(), picks });
         Some(InterfaceMap { interfaces: interfaces.collect(), modal: Vec::new() })
     };
+    // Components of each node, nodes in the order of the rows.
     let mut order: Vec<i64> = Vec::new();
     let mut components: BTreeMap<i64, Vec<u8>> = BTreeMap::new();
     for label in rows.iter().filter(|label| label.dof > 0) {
@@ -280,6 +281,7 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
         }
         list.push(label.dof);
     }
+    // Does every node have exactly the components 1 to `last`?
     let all = |last: u8| components.values().all(|dofs| dofs.iter().copied().eq(1..=last));
     let node = |i: usize, last: u8| RowPick::Node { node: order[i], first: 1, last };
     match order.len() {

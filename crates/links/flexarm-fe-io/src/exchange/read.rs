@@ -143,10 +143,12 @@ fn other_matrix(files: &[InputFile]) -> Result<Option<InputFile>, FeFileError> {
                 | MatrixFormat::Csv
         )
     };
+    // A single file of a format that has one matrix per file.
     let format = |file: &InputFile| recognise(&file.bytes).filter(|format| is_matrix(*format));
     let mut matrices = files.iter().filter(|file| format(file).is_some());
     let (Some(only), None) = (matrices.next(), matrices.next()) else { return Ok(None) };
     let Some(role) = only.role.or_else(|| role_by_name(&only.origin)) else { return Ok(None) };
+    // Usual names of the other matrix, in the same folder and format.
     let path = Path::new(&only.origin);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     for other in other_names(&name, role) {
@@ -491,6 +493,7 @@ fn aligned(
     if !unique(K) || !unique(M) {
         return Err(refuse());
     }
+    // Rows of the stiffness, then those that only the mass has.
     let in_K: HashSet<&DofLabel> = K.rows.iter().collect();
     let only_M = M.rows.iter().filter(|label| !in_K.contains(label));
     let rows: Vec<DofLabel> = K.rows.iter().chain(only_M).copied().collect();

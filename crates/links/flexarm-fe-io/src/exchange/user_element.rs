@@ -89,6 +89,7 @@ fn scan(text: Text<'_>) -> Result<Raw<'_>, FeFileError> {
     Ok(raw)
 }
 
+/// Reads a line with a keyword; returns what the data lines below it contain.
 fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &ErrorPosition<'a>, line: &str) -> Result<Block, FeFileError> {
     let upper: String = line.to_ascii_uppercase().replace(' ', "");
     let mut parts = upper.trim().split(',');
@@ -178,6 +179,8 @@ fn labels(raw: &Raw<'_>, text: Text<'_>) -> Result<Vec<DofLabel>, FeFileError> {
     Ok(rows)
 }
 
+/// Assembles a matrix from its values, row by row: the lower triangle, or the whole matrix if it
+/// may be unsymmetric.
 fn assemble(
     raw_matrix: &RawMatrix<'_>,
     raw: &Raw<'_>,

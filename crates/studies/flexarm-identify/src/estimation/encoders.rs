@@ -161,6 +161,7 @@ impl Fit {
     /// Fits runs with an offset for each encoder of each run, without one block.
     fn of(runs: &[Vec<GearOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
         let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
+        // Normal equations: signals less their mean in each run, compliances shared by all runs.
         let mut sums = Normal::new(motors + outputs);
         for &k in some {
             let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
@@ -175,9 +176,11 @@ impl Fit {
                 sums.add(&columns, &centred(&output.deflection, &kept));
             }
         }
+        // The first values are compliances, the last ones delays of the outputs.
         let mut values = sums.solved(motors)?;
         let delay = values.split_off(motors);
         let mut fit = Self { compliance: values, delay, damping_s: vec![0.0; outputs] };
+        // Damping from the rest of the deflection over its rate.
         fit.damping_s = (0..outputs)
             .map(|number| {
                 let of =

@@ -372,11 +372,13 @@ impl MeasuredArm<'_> {
     fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
         let (X_IW, place, turn) = self.measurements.instrument(number, own);
         let X_WI = X_IW.inverse();
+        // Values: p_WI if the instrument is placed, then φ.
         let phi = rotation_vector((X_IW.rotation * X.rotation.inverse()).matrix());
         let p_WI = placed.then_some(X_WI.translation.vector);
         let values: Vec<f64> = p_WI.iter().flatten().chain(&phi).copied().collect();
         let mut by_own = DMatrix::zeros(values.len(), own.len());
         let rows = values.len() - 3;
+        // Derivatives with respect to the rotation: of φ, and of p_WI.
         if let Some(first) = turn {
             let rates = left_jacobian(&vector_at(own, first));
             let back = left_jacobian(&phi).try_inverse().unwrap_or_else(Matrix3::identity);
@@ -389,6 +391,7 @@ impl MeasuredArm<'_> {
                 }
             }
         }
+        // Derivatives with respect to the position.
         if let (Some(first), true) = (place, placed) {
             by_own.view_mut((0, first), (3, 3)).copy_from(&(-X_WI.rotation.matrix()));
         }

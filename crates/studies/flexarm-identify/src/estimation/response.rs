@@ -353,6 +353,7 @@ impl StructureSlopes {
             slopes: DMatrix::zeros(omega.len(), self.slopes.len()),
         };
         for (k, w) in omega.iter().enumerate() {
+            // Z u = b, H = factor cᵀ u
             let Z = dynamic(s, *w);
             let singular = || StepError::Singular { matrix: "dynamic stiffness (a resonance without damping)", t: 0.0 };
             let u = Z.clone().lu().solve(&b).ok_or_else(singular)?;
@@ -361,6 +362,7 @@ impl StructureSlopes {
             if self.slopes.is_empty() {
                 continue;
             }
+            // Zᵀ y = c serves all parameters: dH = factor (dcᵀ u + yᵀ db - yᵀ dZ u).
             let y = Z.transpose().lu().solve(&c).ok_or_else(singular)?;
             for (p, slope) in self.slopes.iter().enumerate() {
                 let (db, dc) = (complex(&slope.rows[hit]), complex(&slope.rows[watched]));

@@ -148,11 +148,13 @@ fn best_order(
     slides: &[bool],
 ) -> (Vec<usize>, f64) {
     let n = as_said.len();
+    // Only joints of one kind can be exchanged.
     let alike = |order: &[usize]| order.iter().enumerate().all(|(k, from)| slides[k] == slides[*from]);
     let scored = |order: Vec<usize>| alike(&order).then(|| rest(&order).map(|rest| (order, rest))).flatten();
     let others = (1..n).map(|by| (0..n).map(|k| (k + by) % n).collect()).chain([(0..n).rev().collect()]);
     let begins = others.filter_map(scored).chain([(as_said, before)]);
     let least = |a: &(Vec<usize>, f64), b: &(Vec<usize>, f64)| a.1.total_cmp(&b.1);
+    // From each start, make the best exchange until none reduces the residual.
     let climbed = begins.map(|mut best| {
         loop {
             let exchanged = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).filter_map(|(i, j)| {
