@@ -453,6 +453,7 @@ fn put_start(message: &Received, lines: &mut [Line], caveats: &mut FileCaveats<'
         let k = start.joints.iter().position(|joint| **joint == *line.joint)?;
         start.position.get(k).copied().filter(|q| q.is_finite())
     };
+    // All joints or none.
     let places: Option<Vec<f64>> = lines.iter().map(place).collect();
     match places {
         Some(places) => {

@@ -75,6 +75,7 @@ pub(crate) enum Inside {
 pub(crate) fn inside_of(path: &Path, most: u64) -> Result<Inside, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };
     let mut stream = BufReader::new(open_packed(path, most).map_err(failed)?);
+    // The first bytes give the format; they are put back in front of the stream.
     let mut head = [0; 16];
     let mut filled = 0;
     while filled < head.len() {

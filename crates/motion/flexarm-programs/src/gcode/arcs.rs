@@ -69,6 +69,7 @@ impl Helix {
             return f64::INFINITY;
         };
         let start = at(0.0) - circle.centre;
+        // Distance from the circle: across its plane, and in it.
         let distance = |k: u32| {
             let p = at(f64::from(k) / 16.0) - circle.centre;
             let axis_part = circle.normal().dot(&p);
@@ -162,6 +163,8 @@ impl Gcode<'_> {
         Ok([start[u] + du / 2.0 - dv / chord * side, start[v] + dv / 2.0 + du / chord * side])
     }
 
+    /// Returns the arc from start to goal about the centre, at the radius of the start; a rise
+    /// makes it a helix.
     fn helix(
         &self,
         motion: Motion,
@@ -173,6 +176,7 @@ impl Gcode<'_> {
         let [u, v, w] = self.plane.axes();
         let (a, b) = ([start[u] - centre[0], start[v] - centre[1]], [goal[u] - centre[0], goal[v] - centre[1]]);
         let (radius, end_radius) = (a[0].hypot(a[1]), b[0].hypot(b[1]));
+        // Start and end must be equally far from the centre: 0.5 mm, or 0.1 % of the radius.
         if radius < 1e-9 {
             return fail(span, "the arc has its centre where it begins");
         }
@@ -187,6 +191,7 @@ impl Gcode<'_> {
                 ),
             );
         }
+        // An arc that ends where it begins is a full circle.
         let (from, to) = (a[1].atan2(a[0]), b[1].atan2(b[0]));
         let is_whole = (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9;
         let turn = if is_whole { 0.0 } else { (to - from).rem_euclid(TAU) };
@@ -201,6 +206,8 @@ impl Gcode<'_> {
     /// Adds the moves of an arc: one if it is flat and less than a full circle, otherwise several
     /// without a stop.
     fn pieces(&mut self, helix: &Helix, goal: Vector3<f64>, speed: Speed, span: Span) -> Result<()> {
+        // A flat arc may be 315° long: beyond that its start and end are too close together to define
+        // the circle. Pieces of a helix begin with 90° and are halved until the error is allowed.
         let mut count = (helix.angle.abs() / if helix.rise == 0.0 { 1.75 * PI } else { PI / 2.0 }).ceil().max(1.0);
         while helix.rise != 0.0 && helix.distance_of_piece(0.0, 1.0 / count) > HELIX_ERROR {
             count *= 2.0;

@@ -167,6 +167,7 @@ impl Reader<'_> {
     fn inner_value(&mut self) -> Result<f64> {
         self.pass()?;
         let from = self.at;
+        // An expression in brackets, a parameter, a negated one of these, a function, or a number.
         match self.text.get(self.at) {
             Some(b'[') => {
                 self.at += 1;

@@ -78,6 +78,7 @@ fn part(value: &Value, name: &str, span: Span) -> Result<Value> {
 
 /// Functions of numbers and frames.
 pub(super) fn mathematics(machine: &mut Krls<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Value> {
+    // A value that only the controller knows makes the result such a value.
     let mut numbers = Vec::new();
     for (k, argument) in arguments.iter().enumerate() {
         let Some(expression) = &argument.value else { continue };

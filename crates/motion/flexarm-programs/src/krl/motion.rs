@@ -490,6 +490,7 @@ fn blend(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<B
     let mut result = Blend::Stop;
     for argument in arguments {
         let Some(word) = argument.name.as_deref() else { continue };
+        // Component of $APO that the word refers to, and the blend of its value.
         let (part, make): (&str, fn(f64) -> Blend) = match word {
             "c_ptp" => ("cptp", |percent| Blend::Fraction(percent / 200.0)),
             "c_dis" | "c_spl" => ("cdis", |mm| Blend::Distance(mm / 1000.0)),

@@ -132,6 +132,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                     let Some(geometry) = self.target(child, "url") else {
                         return Err(self.malformed(child, "it refers to a geometry that does not exist"));
                     };
+                    // Materials bound to the symbols of the geometry.
                     let bound = child.descendants().filter(|n| n.tag_name().name() == "instance_material");
                     let materials =
                         bound.filter_map(|m| Some((m.attribute("symbol")?, self.target(m, "target")?))).collect();

@@ -41,6 +41,7 @@ pub(super) fn propose(imported: &ImportedMatrices) -> String {
             <[f64; 3]>::from(high)
         );
     }
+    // Reference nodes usually are the last ones of the model.
     let mut nodes: Vec<i64> = imported.stiffness.rows.iter().filter_map(|label| label.node).collect();
     nodes.sort_unstable();
     nodes.dedup();

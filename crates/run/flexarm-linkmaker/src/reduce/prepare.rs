@@ -224,6 +224,7 @@ fn wanted_modes(job: &ReduceJob) -> ModesWanted {
     }
 }
 
+/// Collects the settings of the reduction from the job and the mesh, with their defaults.
 fn plan(
     job: &ReduceJob,
     file: &MeshFile,

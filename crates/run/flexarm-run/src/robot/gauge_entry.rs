@@ -128,6 +128,7 @@ fn place(
         return Err(source.error(name.span(), message));
     }
     let fail = |message: String| source.error(link.span(), format!("{text:?}: {message}"));
+    // The link must be flexible and have a stress model.
     let Some((_, has_stress)) = links.iter().find(|(known, _)| known == link.get_ref()) else {
         let known = links.iter().map(|(link, _)| *link);
         let meant =

@@ -179,6 +179,7 @@ impl Robot {
         files: &FileCache,
     ) -> Result<Arc<Arm>, Error> {
         let folder = path.parent().unwrap_or(Path::new("."));
+        // Faults of all entries are collected, so that one call reports them together.
         let mut faults: Vec<Error> = Vec::new();
         let (rigid, calibration) = changed_mechanism(&mut urdf.mechanism, file, source, &mut faults);
         let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);

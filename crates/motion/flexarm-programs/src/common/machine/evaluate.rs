@@ -76,10 +76,12 @@ impl<D: Dialect> Machine<'_, D> {
         Ok(Value::Pose(pose))
     }
 
+    /// Returns the element of a list or pose at an index, which starts as in the language.
     fn element(&mut self, value: Value, base: &Expr, at: Value, span: Span) -> Result<Value> {
         if let Value::Outside(what) = at {
             return Ok(Value::Outside(what));
         }
+        // System variables without a value are those of the controller.
         let at = at.count(span)?;
         let index = usize::try_from(at - D::FIRST_INDEX).ok();
         let is_system = matches!(&base.kind, Kind::Name(name) if name.starts_with('$'));

@@ -22,6 +22,7 @@ pub(super) fn equal(a: &Value, b: &Value) -> bool {
 /// Applies an operator to numbers, truth values or texts.
 pub(super) fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2], span: Span) -> Result<Value> {
     use Operator::*;
+    // Comparisons of any values, and logic.
     match operator {
         Equal | Unequal => {
             for (value, side) in [a, b].into_iter().zip(sides) {
@@ -34,6 +35,7 @@ pub(super) fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2]
         Either => return Ok(Value::Flag(a.flag(sides[0])? != b.flag(sides[1])?)),
         _ => {}
     }
+    // Texts are joined; whole numbers stay whole where the language has them.
     if let (Add, Value::Text(a), Value::Text(b)) = (operator, a, b) {
         return Ok(Value::Text(format!("{a}{b}").chars().take(LARGEST).collect::<String>().into()));
     }
@@ -42,6 +44,7 @@ pub(super) fn combine(operator: Operator, a: &Value, b: &Value, sides: [Span; 2]
     {
         return result;
     }
+    // All other operators work on numbers.
     let (x, y) = (a.number(sides[0])?, b.number(sides[1])?);
     let number = match operator {
         Add => x + y,

@@ -53,6 +53,7 @@ impl Standard {
         let pose = |p: Vector3<f64>| Pose::from_parts(Translation3::from(p), R);
         let joint = |p: Vector3<f64>| Step::To(MoveKind::Joint, pose(p));
         let line = |p: Vector3<f64>| Step::To(MoveKind::Line, pose(p));
+        // Corners in the inclined plane of the cube that contains the y axis.
         let corner = |y: f64, d: f64| centre + Vector3::new(d, y, -d) * (0.5 * side * TOWARDS_CORNER);
         let corners = [corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0), corner(1.0, -1.0)];
         let mut steps = vec![joint(centre)];
@@ -65,12 +66,14 @@ impl Standard {
                 }
                 Self::Iso9283Paths => {
                     steps.extend(corners.iter().chain([&corners[0]]).map(|p| line(*p)));
+                    // Two circles about the centre, in the plane of the corners.
                     let (u, v) = (Vector3::y(), Vector3::new(1.0, 0.0, -1.0).normalize());
                     for part in [LARGE, SMALL] {
                         steps.extend(circle(centre, 0.5 * part * side, u, v, &pose));
                     }
                 }
                 Self::Circularity => {
+                    // A circle in each coordinate plane, in both senses.
                     let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
                     for (u, v) in [(x, y), (y, z), (z, x)] {
                         steps.extend(circle(centre, 0.5 * side, u, v, &pose));
@@ -78,6 +81,7 @@ impl Standard {
                     }
                 }
                 Self::Settle => {
+                    // To both sides of the centre along each axis.
                     for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
                         for p in [centre + axis * (0.5 * side), centre - axis * (0.5 * side)] {
                             steps.extend([line(p), Step::Rest(REST)]);
