@@ -6,6 +6,8 @@
 //!
 //! The free coordinates x of a plant are those of the joints driven by torque, followed by the
 //! elastic ones. All other joints are prescribed.
+//!
+//! Not here: state, events, or anything that changes during a run (`reduced`).
 
 use std::sync::Arc;
 

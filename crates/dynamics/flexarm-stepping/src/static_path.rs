@@ -1,5 +1,8 @@
 //! Static equilibria along a motion: each one starts from the previous one and reuses its inverse
 //! tangent stiffness.
+//!
+//! Start at [`StaticPath::at`]. Not here: a single equilibrium (`statics.rs`), equilibria at many
+//! unrelated poses (`operating_point`).
 
 use std::sync::Arc;
 

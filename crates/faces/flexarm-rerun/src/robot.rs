@@ -1,5 +1,8 @@
 //! One of the robots of a recording: rigid twin, flexible arm, or flexible arm with magnified
 //! deflections.
+//!
+//! Start at [`RobotTracks`]. Poses in the world (m); a link is an entity with its mesh, moved by a
+//! transform per sample. Not here: numbers and plots (`curves`), buffering of rows (`tracks`).
 
 use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};

@@ -3,6 +3,8 @@
 //! Solutions are in closed form if the arm has one ([`AnalyticArm`]), otherwise found numerically
 //! from many starts. The solution nearest to the current joint values is chosen if the target does
 //! not specify more.
+//!
+//! Not here: the solutions along a path (`follow.rs`).
 
 use flexarm_kinematics::{
     AnalyticArm, ControllerAxes, Data, Frame, IkOptions, Model, Selection, Solutions, forward_kinematics,

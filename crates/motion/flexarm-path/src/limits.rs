@@ -1,5 +1,9 @@
 //! Bounds at the stations of a route: joint limits, torques and tool limits, and which of them
 //! slows a move.
+//!
+//! Start at `Limits::at_stations`. Bounds are on the square of the speed along the path parameter,
+//! and on its derivatives. Not here: the speed itself (`schedule.rs`, and the time laws of
+//! `flexarm-trajectory`).
 
 use flexarm_kinematics::{Data, State, inverse_dynamics};
 use flexarm_trajectory::jerk_law::{JerkBound, PathBounds};

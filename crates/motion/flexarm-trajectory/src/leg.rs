@@ -2,6 +2,8 @@
 //!
 //! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` for moves through via points) times the
 //! travel of each joint.
+//!
+//! Not here: the sequence of the moves (`plan`), the time-optimal law (`optimal`).
 
 use flexarm_settings::Finding;
 

@@ -18,6 +18,8 @@
 //! of the motors and the torques that they need in addition to the feed-forward; the servo commands
 //! for these follow from a small differential equation (`servo`), which is as stable as the servos
 //! themselves.
+//!
+//! Not here: matrices of the arm, which the caller linearises; input shaping (`shaping.rs`).
 
 use nalgebra::{Complex, DMatrix};
 

@@ -9,6 +9,8 @@
 //!
 //! World axes, SI units. Start at [`PathFrame::next`] sample by sample, at [`path_frames`] for a
 //! whole record.
+//!
+//! Not here: the error itself (`pose_error.rs`).
 
 use nalgebra::Vector3;
 

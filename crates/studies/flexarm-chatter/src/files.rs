@@ -1,6 +1,8 @@
 //! Output files of `flexarm lobes`: table, diagram, page, figures.
 //!
 //! Start at [`save`]. Depths are shown rounded down, so that a printed limit is stable.
+//!
+//! Not here: the limits, and texts of the terminal.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;

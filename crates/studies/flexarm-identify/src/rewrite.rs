@@ -2,6 +2,8 @@
 //!
 //! Start at `rewritten`. Each value goes to its `ParameterLocation`; poses are composed of several
 //! values (`put_tool`, `put_frames`). Frames: L link of the tool, T tool.
+//!
+//! Not here: the choice of what is fitted (`choose.rs`), robots made of the new text.
 
 use std::path::Path;
 

@@ -2,6 +2,8 @@
 //!
 //! Start at [`Layout::new`]: rows are written in the same order by [`super::evaluate`]. Names end
 //! in the unit.
+//!
+//! Not here: values of the poses (`evaluate.rs`), files (`files.rs`).
 
 use flexarm_stepping::Plant;
 

@@ -2,6 +2,8 @@
 //!
 //! Start at [`take`]. A thread takes a chunk of places, collects the poses of whole places, and
 //! evaluates them together; the rows are joined in the order of the places.
+//!
+//! Not here: the row of a pose (`evaluate.rs`), inverse kinematics of a place (`finder.rs`).
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;

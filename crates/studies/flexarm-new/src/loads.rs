@@ -1,6 +1,8 @@
 //! Loads of the joints: torques from gravity and acceleration, over the whole workspace.
 //!
 //! Start at [`Workspace::of`]. Efforts in N m or N, maxima over the sampled poses.
+//!
+//! Not here: samples of the poses (`sample.rs`), stiffness of gears for these loads (`gears.rs`).
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, forward_kinematics, gravity_forces, mass_matrix,

@@ -3,6 +3,8 @@
 //! The order is that of [`crate::Model`]: actuated joints in tree order or in that of
 //! `coordinate_order`, elastic joints and modal bodies proximal to distal, joints that follow from
 //! closed loops.
+//!
+//! Not here: checks of the mechanism (`check.rs`).
 
 use std::collections::HashMap;
 

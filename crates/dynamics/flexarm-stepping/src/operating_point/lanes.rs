@@ -4,6 +4,8 @@
 //! The standard path is Newton's iteration with the factor of the springs at rest, up to
 //! convergence. A lane that leaves it (weight or loads that change the stiffness much, steps that
 //! are too large, no equilibrium) is reported and solved individually.
+//!
+//! Not here: lanes that are solved individually (`each.rs`).
 
 use std::sync::Arc;
 

@@ -28,6 +28,8 @@
 //!
 //! Sources: BDF of variable order [Shampine & Reichelt 1997], ESDIRK3(4) [Jørgensen, Kristensen &
 //! Thomsen 2018], explicit 5(4) pair [Tsitouras 2011].
+//!
+//! Not here: evaluation of ẍ (`reduced`), the steppers of fixed step size.
 
 use std::sync::Arc;
 

@@ -2,6 +2,8 @@
 //!
 //! Node numbers are only in comments (CalculiX, `** ELEMENT NODES`) or in an `*ELEMENT` line.
 //! Matrices are lower triangles row by row; line breaks have no meaning.
+//!
+//! Not here: the choice of the matrices that make a link (`read.rs`).
 
 use nalgebra::DMatrix;
 

@@ -4,6 +4,8 @@
 //! Start at [`Parameters::line`]. Values are as written, without units. Parameters are numbered
 //! (`#1`) or named (`#<name>`); assignments of a line take effect after its words are read, as the
 //! standard says.
+//!
+//! Not here: what a word does (`modes`, `moves`, `frames`).
 
 use std::collections::HashMap;
 

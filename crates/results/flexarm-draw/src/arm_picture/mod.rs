@@ -7,6 +7,8 @@
 //! without surfaces are drawn as rods. Start at [`arm_pictures`] for pages that explain the picture
 //! in their text, and at [`arm_png`] for a self-explanatory picture; [`arm_sheet`] shows both sides
 //! next to each other under a heading.
+//!
+//! Not here: projection, surfaces and pixels (`crate::mesh_picture`), charts (`crate::plot`).
 
 pub(crate) mod ellipsoid;
 pub(crate) mod legend;

@@ -12,6 +12,9 @@
 //! ```
 //! On a helical tooth the edge at height z lags by the angle `2 z tan(helix) / diameter`; the
 //! integral over the depth is in closed form.
+//!
+//! Not here: times at which teeth enter and leave (`period.rs`), entries of tool files
+//! (`tool_file.rs`).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -6,6 +6,8 @@
 //! Any linear structure without defective poles has this form: modes with damping ratios, or `M`,
 //! `D`, `K` with any damping ([`Structure::from_matrices`]). Structures in series, such as a tool
 //! on a flange, have the poles of both.
+//!
+//! Not here: the arm and its pose (`place.rs` of the crate).
 
 use nalgebra::{Complex, Matrix3, Vector3};
 

@@ -4,6 +4,9 @@
 //! One fit gives everything: its solution is what is reported and written. Springs are sought as
 //! compliances with a prior around zero that are not negative, so that a spring which the readings
 //! do not determine is rigid.
+//!
+//! Not here: derivatives (`sensitivity`, `response`), the least-squares solver (`least_squares`),
+//! files.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 

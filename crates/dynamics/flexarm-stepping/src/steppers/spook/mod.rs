@@ -20,6 +20,8 @@
 //! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] contains
 //! the rows, [`solve`] the elimination, [`pins`] the closure of loops, [`observe`] what a run
 //! reports. Source: [Lacoursière 2007]; theory page, section 4.
+//!
+//! Not here: elimination of the rows (`solve`), joint rows (`constraint`), pins of loops (`pins`).
 
 mod checks;
 mod compliance;
