@@ -60,7 +60,8 @@ pub struct IkError {
     pub at_limit: Vec<String>,
 }
 
-/// Finds joint values, nv long, that bring `frame` to `X_WT`, starting from `q_start` (nv long).
+/// Finds joint values, nv long, that bring `frame` to `X_WT`, starting from `q_start` (nv long; rad
+/// or m).
 ///
 /// # Errors
 /// [`IkError`] if the target is not reached within tolerance.

@@ -101,7 +101,7 @@ impl Linear {
     }
 
     /// Returns the compliance as [`Linear::compliance`] does, with the stiffness of the servos
-    /// included. `None` if a motor is not held.
+    /// included. `None` if a motor is not held. Units as there.
     pub fn yielding_compliance(&self) -> Option<Matrix6<f64>> {
         let K = (&self.K + self.K.transpose()) * 0.5;
         let scale = K.diagonal().amax();

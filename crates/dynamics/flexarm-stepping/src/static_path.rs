@@ -84,7 +84,8 @@ impl StaticPath {
         self.balanced(t)
     }
 
-    /// Returns the coordinates just before `t`: events at that time are still pending.
+    /// Returns the coordinates just before `t` (s), in m and rad: events at that time are still
+    /// pending.
     ///
     /// # Errors
     /// As [`static_equilibrium`].

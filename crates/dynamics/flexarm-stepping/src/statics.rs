@@ -17,7 +17,8 @@ use crate::error::StepError;
 use crate::geometric::add_geometric_forces;
 use crate::plant::Plant;
 
-/// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`.
+/// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`
+/// (s), n long (m, rad).
 ///
 /// Inertia forces are neglected: the drives are held at the position of the motion at `t`.
 ///

@@ -44,8 +44,8 @@ pub struct Noise {
     pub cutoff_hz: f64,
 }
 
-/// Estimates the noise of evenly sampled positions from their fourth differences; `None` if the
-/// samples are uneven, few or smooth.
+/// Estimates the noise of positions `q` (rad or m), sampled evenly at `t` (s), from their fourth
+/// differences; `None` if the samples are uneven, few or smooth.
 pub fn noise(t: &[f64], q: &[f64]) -> Option<Noise> {
     let n = q.len();
     if n < MIN_SAMPLES + 4 {

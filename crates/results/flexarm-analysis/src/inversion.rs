@@ -185,7 +185,7 @@ impl Inversion {
         self.cutoff_hz
     }
 
-    /// Returns the part of an error (k×N, `step_s` apart) above the cutoff.
+    /// Returns the part of an error (k×N, `step_s` (s) apart) above the cutoff.
     pub fn quicker_than_cutoff(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
         if y.ncols() == 0 {
             return y.clone();

@@ -22,8 +22,8 @@ pub struct RepeatedPose {
     pub repeatability_m: f64,
 }
 
-/// Returns the poses with two or more rests, ordered by their first rest; the attained position is
-/// that at the end of a rest.
+/// Returns the poses with two or more rests, ordered by their first rest; the attained position
+/// (world, m) is that at the end of a rest.
 pub fn repeated_poses(holds: &[HoldMetrics]) -> Vec<RepeatedPose> {
     let mut groups: Vec<(Vector3<f64>, Vec<Vector3<f64>>)> = Vec::new();
     for hold in holds {

@@ -261,7 +261,7 @@ impl AnalyticArm {
     }
 
     /// Whether the elbow is up: above the line from axis 2 to the wrist centre, when the wrist
-    /// centre is farther out than axis 2.
+    /// centre is farther out than axis 2. `q`: joint values (rad).
     ///
     /// `None` for arms other than those with a spherical wrist and axes 2 and 3 parallel.
     pub fn elbow_up(&self, q: &[f64; 6]) -> Option<bool> {
@@ -371,7 +371,7 @@ impl AnalyticArm {
     }
 
     /// Calls `visit` with every copy of the joint values, shifted by whole turns, that is within
-    /// the limits; a joint without limits has one copy, in (-π, π].
+    /// the limits; a joint without limits has one copy, in (-π, π]. Joint values in rad.
     pub fn copies_within_limits(&self, q: &[f64; 6], mut visit: impl FnMut(&[f64; 6])) {
         let ranges: [_; 6] = std::array::from_fn(|k| self.turns(k, wrapped(q[k])));
         if ranges.iter().any(|(low, high)| low > high) {

@@ -57,7 +57,7 @@ impl Roots {
         Self { angles: [center + half, center - half], n: if half == 0.0 { 1 } else { 2 }, free: false }
     }
 
-    /// The roots.
+    /// The roots (rad).
     pub fn angles(&self) -> &[f64] {
         &self.angles[..self.n]
     }

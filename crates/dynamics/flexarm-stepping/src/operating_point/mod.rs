@@ -291,7 +291,7 @@ impl OperatingPoint {
         &self.plant
     }
 
-    /// Returns the pose of the tool in the world at the equilibrium.
+    /// Returns `X_WT`, the pose of the tool in the world at the equilibrium.
     pub fn tcp_pose(&self) -> Pose {
         self.X_WT
     }
@@ -301,7 +301,7 @@ impl OperatingPoint {
         self.X_WT_rigid
     }
 
-    /// Returns all coordinates at the equilibrium: joints, then elastic ones.
+    /// Returns all coordinates at the equilibrium: joints, then elastic ones (rad or m).
     pub fn coordinates(&self) -> &DVector<f64> {
         &self.q
     }
@@ -329,7 +329,7 @@ impl OperatingPoint {
     }
 
     /// Adds the static forces on the elastic coordinates due to the weight of an additional inertia
-    /// on a body (`M_BBo_B`) to `p` (n).
+    /// on a body (`M_BBo_B`) to `p` (n; N, N m).
     ///
     /// # Panics
     /// If `p` is not n long, or there is no such body.

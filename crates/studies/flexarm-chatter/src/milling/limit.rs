@@ -116,9 +116,9 @@ pub fn limit_of_depth(
     Ok(Some(described(structure, cutter, spindle, &period, depth, change)))
 }
 
-/// Computes all ranges of depth up to the maximum in which the cut chatters. The first limit has
-/// the given tolerance; the other ends are those of elements refined once. The last range may end
-/// at the maximum depth.
+/// Computes all ranges of depth (m) up to the maximum in which the cut chatters. The first limit
+/// has the given tolerance; the other ends are those of elements refined once. The last range may
+/// end at the maximum depth.
 ///
 /// Cost: that of a limit, plus an eigenvalue problem per further depth of the search. Ranges
 /// narrower than a step may be missed.
@@ -157,7 +157,7 @@ pub fn unstable_ranges(
     Ok(ranges)
 }
 
-/// Computes the largest Floquet multiplier over one tooth period at a depth. The elements are
+/// Computes the largest Floquet multiplier over one tooth period at a depth (m). The elements are
 /// refined until its magnitude converges to `1e-6`.
 ///
 /// # Errors

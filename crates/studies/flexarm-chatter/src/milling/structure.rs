@@ -102,7 +102,8 @@ impl Structure {
         self
     }
 
-    /// Returns the structure in other axes, `u_new = R u`, `F_new = R F`.
+    /// Returns the structure in other axes, `u_new = R u`, `F_new = R F`. `R` has the old
+    /// axes as columns, in the new ones.
     #[must_use]
     pub fn rotated(mut self, R: &Matrix3<f64>) -> Self {
         let R = R.map(|x| Complex::new(x, 0.0));
