@@ -187,10 +187,10 @@ impl<T: Real> StaticTangent<T> {
                 }
                 JointMotion::Interface { modal, interface } => {
                     let Phi = &model.modal[modal].tables.shapes.interfaces[interface].Phi;
-                    let of = |(c, Phi): (usize, nalgebra::MatrixView6x1<'_, f64>)| {
+                    let mode_column = |(c, Phi): (usize, nalgebra::MatrixView6x1<'_, f64>)| {
                         column(k + c, i, Phi.fixed_rows::<3>(0).into(), Phi.fixed_rows::<3>(3).into())
                     };
-                    columns.extend(Phi.column_iter().enumerate().map(of));
+                    columns.extend(Phi.column_iter().enumerate().map(mode_column));
                 }
             }
         }

@@ -245,13 +245,13 @@ impl Servo {
         forward_kinematics(model, &mut data, &pose);
         StaticTangent::new(model, 0).compute(model, &data, &pose, &[], &mut K);
         let D = DMatrix::from_fn(m, m, |i, j| if i == j { viscous(friction, i) } else { 0.0 });
-        let of = |A: &DMatrix<f64>| {
+        let of_axes = |A: &DMatrix<f64>| {
             DMatrix::from_fn(self.axes.len(), m, |i, k| {
                 let axis = &self.axes[i];
                 axis.feed_forward * A[(axis.coordinate, k)]
             })
         };
-        [of(&K), of(&D), of(&M)]
+        [of_axes(&K), of_axes(&D), of_axes(&M)]
     }
 
     /// Returns the servo with zero gains and without feed-forward: the motors are free.

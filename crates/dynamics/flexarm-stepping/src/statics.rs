@@ -315,6 +315,7 @@ impl StaticSlopes {
         self.exact.add_moved_subtree(&plant.model, data, moved, observed, p)
     }
 
+    /// Writes the derivative of the static forces into `G` by central differences.
     fn difference(
         &mut self,
         plant: &Plant,

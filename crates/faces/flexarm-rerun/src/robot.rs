@@ -125,6 +125,7 @@ impl RobotTracks {
         stream.name_frame(&self.look.root.join(&path(["tcp"])), &format!("{prefix}{}/tcp", header.tcp))
     }
 
+    /// Adds the mesh of a link: rigid, or in pieces before, within and behind a bend.
     fn surface(&mut self, header: &RunHeader, mesh: &LinkMesh, stream: &RrdStream) -> Result<()> {
         let entity = self.look.root.join(&path([&link_part(&header.links[mesh.link].name), &mesh.name]));
         let mut first = 0;

@@ -511,6 +511,8 @@ impl Line {
         }
     }
 
+    /// Appends a column of points at their times after `from` (s); a point at the end of the
+    /// trajectory before it must agree with it.
     fn append(&mut self, from: f64, points: &[Point], column: usize, number: usize) -> Result<(), PlacedProblem> {
         for point in points {
             let t = from + point.time_s;

@@ -55,6 +55,7 @@ pub fn read_text(text: &str, origin: &str, request: &Request<'_>) -> Result<Mess
     read(text.trim_start_matches('\u{feff}'), origin, request).map_err(|trouble| trouble.of(origin))
 }
 
+/// Reads messages printed as YAML or JSON, one document each.
 fn read(text: &str, origin: &str, request: &Request<'_>) -> Result<MessageMotion, PlacedProblem> {
     if let Some(asked) = request.topic {
         return Err(PlacedProblem::new(format!(

@@ -78,6 +78,7 @@ impl<'m> Branches<'m> {
         })
     }
 
+    /// Chooses among all solutions in closed form.
     fn in_closed_form(
         &mut self,
         arm: &AnalyticArm,
@@ -104,6 +105,7 @@ impl<'m> Branches<'m> {
         answer
     }
 
+    /// Searches the nearest solution numerically; it cannot name a branch.
     fn search(
         &mut self,
         frame: &Frame,

@@ -156,6 +156,7 @@ impl<'a> Limits<'a> {
         PathBounds { x_max: point.x_max, bounds: point.bounds, jerks }
     }
 
+    /// Adds the bounds of joints, tool and torques at a station.
     fn collect(&mut self, piece: &Piece, there: &PathState<'_>, at: &mut AtStation<'_>) {
         for (joint, bounds) in self.arm.bounds.iter().enumerate() {
             let name = || self.arm.model.coordinates()[joint].joint.clone();
@@ -205,6 +206,7 @@ impl AtStation<'_> {
         self.point.x_max = self.point.x_max.min(x);
     }
 
+    /// Bounds of a joint with `q' = d`, `q'' = dd`: speed, and acceleration `d s̈ + dd ṡ²`.
     fn joint(&mut self, d: f64, dd: f64, bounds: &JointBounds, piece: &Piece, name: &dyn Fn() -> String) {
         let speed = &piece.speed;
         let is_joint_move = piece.tool.is_empty();
@@ -242,6 +244,7 @@ impl AtStation<'_> {
         }
     }
 
+    /// Bounds of the TCP: programmed speeds, and accelerations along the path.
     fn tool(&mut self, V: &Vector6<f64>, A: &Vector6<f64>, piece: &Piece) {
         let speed = &piece.speed;
         let three = |six: &Vector6<f64>, row: usize| Vector3::new(six[row], six[row + 1], six[row + 2]);

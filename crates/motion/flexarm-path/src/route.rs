@@ -157,9 +157,9 @@ impl Route {
                 let near =
                     self.stations.last().map_or_else(|| self.legs[stretch.leg].q0.clone(), |last| last.q.clone());
                 let follower = owner.follower(&way.frame, &near);
-                let of = &self.legs[stretch.leg].of;
+                let leg_move = &self.legs[stretch.leg].of;
                 let walked = walk(follower, way, stretch.range, &near, &options);
-                let (points, sigma) = walked.map_err(|blocked| blocked_error(of, &way.curve, blocked))?;
+                let (points, sigma) = walked.map_err(|blocked| blocked_error(leg_move, &way.curve, blocked))?;
                 let tool = points.iter().map(|(s, _)| way.curve.at(*s)).collect();
                 (points, tool, Some(sigma))
             }

@@ -214,7 +214,7 @@ impl Inversion {
             derivatives.push(derivative(&derivatives[order - 1], step_s));
         }
         // Σ A_i y⁽ⁱ⁾ of the series `terms`, for `count` columns from `first`.
-        let of = |terms: fn(&Series) -> &[DMatrix<f64>; ORDER], rows: usize, first: usize, count: usize| {
+        let applied = |terms: fn(&Series) -> &[DMatrix<f64>; ORDER], rows: usize, first: usize, count: usize| {
             let mut sum = DMatrix::zeros(rows, count);
             for column in 0..count {
                 let time = (first + column) as f64 - pad as f64;
@@ -226,10 +226,10 @@ impl Inversion {
             }
             sum
         };
-        let mut u = of(|series| &series.A, m, pad, N);
+        let mut u = applied(|series| &series.A, m, pad, N);
         if let Some(servo) = self.servos.first() {
             // Starts before the motion begins, so that it is reached at rest.
-            let torques = of(|series| &series.torques, servo.axes.len(), 0, pad + N);
+            let torques = applied(|series| &series.torques, servo.axes.len(), 0, pad + N);
             let at =
                 |column: usize| NodeServo::between(&self.servos, self.nodes_at((column as f64 - pad as f64) * step_s));
             let ahead = NodeServo::leads(at, &torques, step_s);

@@ -211,8 +211,9 @@ impl<'a> Gears<'a> {
     /// over time.
     fn per_compliance(&self, run: &Smooth<'_>, torque: &[Vec<f64>], i: usize, motor: usize) -> Vec<f64> {
         let C = &self.C;
-        let of = |s: usize| self.places.iter().enumerate().map(|(j, k)| C[(j, motor)] * torque[*k][s]).sum::<f64>();
-        run.kept.clone().map(|s| C[(i, motor)] * of(s)).collect()
+        let motor_torque =
+            |s: usize| self.places.iter().enumerate().map(|(j, k)| C[(j, motor)] * torque[*k][s]).sum::<f64>();
+        run.kept.clone().map(|s| C[(i, motor)] * motor_torque(s)).collect()
     }
 
     /// Returns the deflection of a joint that the springs to be identified cause. Springs that are

@@ -65,15 +65,15 @@ pub(crate) struct Candidate {
 /// Returns all parameters of an arm, in the order of drives, links, tool and payload.
 pub(crate) fn candidates(robot: &Robot, arm: &Arm) -> Vec<Candidate> {
     // Springs of a drive or a link, by number.
-    let of = |owner: Owner| -> Vec<usize> {
+    let springs_of = |owner: Owner| -> Vec<usize> {
         arm.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
     };
     let mut found = Vec::new();
     for (number, drive) in robot.drives.iter().enumerate() {
-        found.extend(drive_parameters(drive, of(Owner::Drive(number)), arm));
+        found.extend(drive_parameters(drive, springs_of(Owner::Drive(number)), arm));
     }
     for (number, span) in arm.spans.iter().enumerate() {
-        let springs = of(Owner::Link(number));
+        let springs = springs_of(Owner::Link(number));
         if robot.stands_on(&span.link) {
             found.extend(mounting_parameters(robot, &springs));
         } else if let Some(link) = robot.flexible_links.iter().find(|link| link.flexible.link == span.link) {

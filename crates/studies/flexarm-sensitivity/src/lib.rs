@@ -249,7 +249,7 @@ pub fn sensitivity(
     }
     // Effects of the reported changes, strongest first.
     let (position, rotation) = (&found.position, &found.rotation);
-    let of = |(k, own): (usize, NamedParameter)| ParameterSensitivity {
+    let parameter_figures = |(k, own): (usize, NamedParameter)| ParameterSensitivity {
         name: own.name,
         unit: own.unit,
         value: own.value,
@@ -259,7 +259,7 @@ pub fn sensitivity(
         peak_rad: rotation.peak_slopes[k] * own.scale,
         rms_rad: rotation.rms_slopes[k] * own.scale,
     };
-    let mut parameters: Vec<ParameterSensitivity> = named.into_iter().enumerate().map(of).collect();
+    let mut parameters: Vec<ParameterSensitivity> = named.into_iter().enumerate().map(parameter_figures).collect();
     parameters.sort_by(|a, b| b.rms_m.abs().total_cmp(&a.rms_m.abs()));
     Ok(Sensitivity {
         robot: robot.name.clone(),

@@ -106,6 +106,7 @@ impl Parallel234 {
         }
     }
 
+    /// Angles of joints 1 and 5 from (i) and (ii), with whether one of them is free.
     fn first_and_fifth(&self, G: &Pose, hint: &[f64; 6]) -> Pairs {
         let [s1, s2, _, _, s5, s6] = &self.axes;
         let (h, (o5, o6)) = (s2.h, self.near);
@@ -204,6 +205,8 @@ impl Parallel123 {
         }
     }
 
+    /// Angles of joints 4 and 5: the height of the tool point along h, and the component of `h_6`
+    /// along h, are not affected by joints 1 to 3.
     fn fourth_and_fifth(&self, G: &Pose, hint: &[f64; 6]) -> Pairs {
         let [s1, _, _, s4, s5, s6] = &self.axes;
         let (h, (o5, o6)) = (s1.h, self.near);

@@ -277,13 +277,13 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_fixed: &DVector
 fn dexterity(chain: &Chain) -> f64 {
     let positions =
         [[0.3, -0.7, 1.1, 0.5, -0.9, 0.4], [-1.2, 0.4, -0.6, 1.3, 0.8, -0.2], [2.1, 0.9, 0.5, -1.6, 1.4, 1.0]];
-    let of = |q: &[f64; 6]| {
+    let conditioning = |q: &[f64; 6]| {
         let mut J = chain.jacobian(q);
         J.fixed_rows_mut::<3>(0).scale_mut(1.0 / chain.reach);
         let values = J.singular_values();
         values.min() / values.max()
     };
-    positions.iter().map(of).fold(0.0, f64::max)
+    positions.iter().map(conditioning).fold(0.0, f64::max)
 }
 
 struct RecognisedArm {
@@ -379,6 +379,8 @@ impl Lines {
         Some((c, apart)).filter(|_| apart.is_finite())
     }
 
+    /// Axes with a spherical wrist made exact, the form of the position problem, and the largest
+    /// deviation from both (relative to the reach, or rad).
     fn wrist(&self) -> Option<(Kernel, PositionForm, f64)> {
         let (center, apart) = self.meeting_point()?;
         let apart = apart / self.reach;

@@ -81,6 +81,7 @@ impl Interface {
     }
 }
 
+/// Parses one term of an interface: a node, some of its components, or rows by number.
 fn parse_pick(name: &str, text: &str) -> Result<RowPick, FeFileError> {
     let text = text.trim();
     let help = "write A=1001 or A=1001:1-6 or A=#1-6; join several with +";
@@ -202,6 +203,7 @@ impl InterfaceMap {
     }
 }
 
+/// Returns the indices of the rows that a term picks.
 fn find_rows(
     pick: RowPick,
     name: &str,

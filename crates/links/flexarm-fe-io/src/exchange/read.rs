@@ -275,6 +275,7 @@ pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<Import
     choose(found, names, origin)
 }
 
+/// Parses a file by its format, and adds what it has to `found`.
 fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), FeFileError> {
     let origin = file.origin.as_str();
     let Some(format) = recognise(&file.bytes) else {

@@ -51,6 +51,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Vec<(MatrixRole, LabelledMatrix)>,
     raw.matrices.iter().map(|matrix| Ok((matrix.role, assemble(matrix, &raw, &rows, text)?))).collect()
 }
 
+/// Collects the lines of the elements and matrices, without interpreting them.
 fn scan(text: Text<'_>) -> Result<Raw<'_>, FeFileError> {
     let mut raw = Raw::default();
     let mut block = Block::Other;

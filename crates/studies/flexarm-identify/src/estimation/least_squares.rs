@@ -316,11 +316,11 @@ impl<P: Residuals> Fit<'_, P> {
 
     /// Sets the standard deviations `s` to the present errors and shares.
     fn set_deviations(&mut self) {
-        let of = |noise: &Noise| match noise.kind {
+        let deviation = |noise: &Noise| match noise.kind {
             Some(kind) => (self.shares[kind] * noise.std).hypot(self.errors[kind] * noise.size),
             None => noise.std,
         };
-        self.s = DVector::from_iterator(self.noise.len(), self.noise.iter().map(of));
+        self.s = DVector::from_iterator(self.noise.len(), self.noise.iter().map(deviation));
     }
 
     /// Estimates the errors of the model anew; returns their largest relative change.

@@ -227,7 +227,7 @@ impl MeasuredArm<'_> {
 
     /// Returns the measured numbers in the order of [`Self::predicted`].
     pub fn observed(&self) -> Vec<f64> {
-        let of = |reading: &Reading| -> Vec<f64> {
+        let values_of = |reading: &Reading| -> Vec<f64> {
             match &reading.kind {
                 ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
                 ReadingKind::Place { rows, .. } | ReadingKind::Frequencies { rows, .. } => {
@@ -246,7 +246,7 @@ impl MeasuredArm<'_> {
                 ReadingKind::Shape(shape) => shape.unit().iter().copied().collect(),
             }
         };
-        self.measurements.readings.iter().flat_map(of).collect()
+        self.measurements.readings.iter().flat_map(values_of).collect()
     }
 
     /// Returns, for each measured mode shape, the number of its reading, the index of the most

@@ -242,8 +242,8 @@ fn place_rest(nominal: &NominalArm, measurements: &Measurements) -> Option<f64> 
                 matches!(measurements.readings[*k].kind, ReadingKind::Place { instrument, .. } if instrument == number)
             })
             .collect();
-        let of = |all: &[Vector3<f64>]| own.iter().map(|k| all[*k]).collect::<Vec<_>>();
-        let (p, q) = (of(&predicted), of(&measured));
+        let chosen = |all: &[Vector3<f64>]| own.iter().map(|k| all[*k]).collect::<Vec<_>>();
+        let (p, q) = (chosen(&predicted), chosen(&measured));
         if q.len() < 5 {
             continue;
         }

@@ -138,6 +138,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         Ok(())
     }
 
+    /// Parses a node up to `end node`; nq modes.
     fn node(&mut self, place: ErrorPosition<'a>, id: i64, nq: usize) -> Result<SidNode, FeFileError> {
         let mut rframe = String::new();
         let mut found: [Option<SidMatrix>; 5] = Default::default();
