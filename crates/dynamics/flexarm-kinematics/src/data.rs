@@ -62,7 +62,7 @@ pub struct Data<T: Scalar = f64> {
     pub X_WB: Vec<Pose<T>>,
     /// Twist `V_WB_B` of each body at Bo in B axes.
     pub V: Vec<Twist<T>>,
-    /// Spatial acceleration `As_WB_B`, minus gravity if the algorithm says so.
+    /// Spatial acceleration `As_WB_B` minus gravity, of the last inverse or forward dynamics.
     pub A: Vec<Twist<T>>,
     /// Wrench exerted by the joint on each body, at Bo in B axes ([`crate::inverse_dynamics`]).
     pub F: Vec<Wrench<T>>,

@@ -71,6 +71,8 @@ pub(crate) enum Inside {
     Database(Vec<u8>),
 }
 
+/// Unpacks a compressed recording, and recognises its format.
+///
 /// * `most`: maximum size of the content, bytes.
 pub(crate) fn inside_of(path: &Path, most: u64) -> Result<Inside, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };

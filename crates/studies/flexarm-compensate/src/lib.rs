@@ -380,7 +380,7 @@ fn check(scenario: &Scenario, request: &CompensateRequest, arm: &Arc<Arm>) -> Re
         let found = request.iterations as f64;
         return Err(value("the number of iterations", found, "at most 100"));
     }
-    // Limits and payloads, and an arm that deflects at all.
+    // Limits and payloads, and whether anything in the arm is elastic.
     let (found, expected) = (request.accelerations.len(), arm.joints().count());
     if found != 0 && found != expected {
         return Err(CompensateError::Input(format!(

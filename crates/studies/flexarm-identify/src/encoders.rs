@@ -117,7 +117,7 @@ pub(super) fn encoder_figures(
     let filed: Vec<Option<f64>> = joints.iter().map(filed).collect();
     let runs = input.recordings.iter().map(|recording| Smooth::of(recording, &model, &filed));
     let runs = runs.collect::<Result<Vec<_>, Error>>()?;
-    // Each gear by itself, coupled gears together.
+    // One fit per gear; coupled gears are fitted together.
     let single = joints.iter().filter(|joint| !is_coupled(joint)).map(|joint| {
         let C = DMatrix::from_element(1, 1, 1.0);
         Gears::of(&runs, &joints, (std::slice::from_ref(joint), C), chosen, &all)

@@ -73,6 +73,8 @@ pub(super) const HEAD: [(&str, &str); 6] = [
 pub(super) const PLACE: usize = 3;
 
 impl Layout {
+    /// Lists the columns of a map.
+    ///
     /// * `joints`: names, and whether they are prismatic.
     /// * `loaded`: whether a wrench acts in addition to gravity.
     /// * `tool`: a cutting tool.

@@ -108,7 +108,9 @@ pub(crate) fn posed(model: &Model, data: &mut Data, q: DVector<f64>) -> Posed {
 }
 
 impl Workspace {
-    /// * `ranges`: range of each coordinate; a held one has equal ends.
+    /// Samples the poses of the workspace.
+    ///
+    /// * `ranges`: range of each coordinate (rad or m); a fixed one has equal ends.
     pub(crate) fn of(model: &Model, ranges: &[[f64; 2]]) -> Self {
         let n = model.nv();
         let moved: Vec<usize> = (0..n).filter(|&k| ranges[k][0] < ranges[k][1]).collect();

@@ -314,7 +314,7 @@ fn recognise(chain: &Chain, frame: &str) -> Result<RecognisedArm, NoAnalyticIk> 
             }
         }
     }
-    // No class: say how far the arm is from each.
+    // No class matches: report the distance from each.
     let apart = |lines: &Lines| lines.meeting_point().map_or(f64::INFINITY, |(_, apart)| apart);
     let spread = |i: usize| from_base.angle(i, i + 1).max(from_base.angle(i, i + 2));
     Err(NoAnalyticIk::NoClass {

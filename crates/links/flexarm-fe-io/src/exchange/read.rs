@@ -237,7 +237,7 @@ fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, FeF
         let plain = folder.join(name);
         if plain.exists() { plain } else { folder.join(format!("{name}.gz")) }
     };
-    // Each format lacks something: labels of rows, the mass, units and interfaces.
+    // Files with what the format lacks: labels of rows, the mass, units and interfaces.
     let mut wanted = Vec::new();
     match recognise(&file.bytes) {
         Some(MatrixFormat::CoordinateText) if ending == "sti" => {

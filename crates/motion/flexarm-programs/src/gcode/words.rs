@@ -131,7 +131,7 @@ impl Reader<'_> {
             let value = self.value()?;
             line.words.push(Word { letter, value, span: self.span(from) });
         }
-        // Line numbers say nothing.
+        // Line numbers have no effect.
         line.words.retain(|word| word.letter != 'N');
         Ok((line, set))
     }

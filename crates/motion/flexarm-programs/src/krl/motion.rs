@@ -152,7 +152,7 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
     if !is_joint && matches!(to, Target::Joints(_)) {
         return fail(span, "a path needs a target with X, Y, Z; axis values (A1...) are for PTP");
     }
-    // Knots of a spline are passed; other moves stop or blend as their words say.
+    // Knots of a spline are passed; other moves stop or blend by the words after the target.
     let blend = if machine.dialect.in_spline { Blend::Pass } else { blend(machine, arguments, span)? };
     let end = end_of_arc(machine, &context, &kind, &to, span);
     let step = Move { place: Place::default(), statement: String::new(), kind, to, X_WB, X_FT, speed, blend };

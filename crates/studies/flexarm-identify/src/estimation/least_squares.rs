@@ -499,7 +499,7 @@ fn dependent(normal: &DMatrix<f64>) -> Option<usize> {
     None
 }
 
-/// Returns the error of the model at which residuals scatter as their deviations say; 0 if they
+/// Returns the error of the model at which residuals scatter as their deviations predict; 0 if they
 /// scatter less without it.
 ///
 /// * `freedom`: number of the residuals minus what the fit takes.

@@ -254,7 +254,7 @@ pub(crate) struct Linearised {
 /// Solves the equilibrium at a pose, and computes modes and total derivatives there.
 ///
 /// ```text
-/// de/dx = -K^-1 dr/dx,   dK/dx = ∂K/∂x + ∂K/∂e de/dx,   dM/dx alike
+/// de/dx = -K^-1 dr/dx,   dK/dx = ∂K/∂x + ∂K/∂e de/dx,   dM/dx likewise
 /// ```
 /// * `more`: further matrices of the coordinates, differentiated along `de/dx`.
 ///

@@ -17,7 +17,9 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// `model`: that of the arm at the start.
+    /// Creates the monitor.
+    ///
+    /// * `model`: tree of the arm at the start.
     pub fn new(model: &Arc<Model>) -> Self {
         Self { model: model.clone(), book: EnergyBook::default() }
     }

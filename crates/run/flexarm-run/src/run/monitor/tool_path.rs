@@ -114,6 +114,8 @@ impl ToolPathMonitor {
         }
     }
 
+    /// Takes a sample at t (s).
+    ///
     /// * `velocity`: of the rigid TCP (m/s, world axes).
     pub fn update(&mut self, t: f64, tool: &ToolError, velocity: &Vector3<f64>) {
         let moves = &self.path.moves;
