@@ -237,12 +237,14 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
             data.X_PB[i] = pose(lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector))
         }
         JointMotion::Elastic(angles) => {
+            // X_PB = X_PJ (R, d), with the rates of d in P axes: L = Rᵀ in B axes.
             let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
             place_elastic(&mut data.X_PB[i], body, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
             data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
+            // Displacement d and small rotation φ of the interface from the modal coordinates.
             let moving = k..k + modal.tables.moving[interface];
             let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[moving]);
             let (R, B) = ElasticAngles::RotationVector.pose(&phi);

@@ -47,11 +47,12 @@ pub struct EventQueue {
 impl EventQueue {
     /// Creates the queue for the start of a run.
     pub fn of(plant: &Plant) -> Self {
-        let loads = plant.loads.iter().flat_map(|load| {
-            let jumps = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
-            jumps.chain(load.wrench.stops.iter().copied())
+        // Times (s) at which a load or a velocity jumps.
+        let load_times = plant.loads.iter().flat_map(|load| {
+            let discontinuities = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
+            discontinuities.chain(load.wrench.stops.iter().copied())
         });
-        let mut jumps: Vec<f64> = loads.chain(plant.motion.velocity_jumps()).collect();
+        let mut jumps: Vec<f64> = load_times.chain(plant.motion.velocity_jumps()).collect();
         jumps.sort_by(f64::total_cmp);
         let clock = plant.servo.as_ref().map(|servo| SampleClock { sample_s: servo.sample_s, next: 0 });
         Self { jumps, jumps_over: 0, changes: plant.inertia_changes.clone(), changes_over: 0, clock }

@@ -56,6 +56,8 @@ impl<'m> Branches<'m> {
         if let Configuration::Near(values) = configuration {
             program_arm.set_axes(values, &mut near);
         }
+        // Closed form if the frame has one, else a search. The arm is taken out while `self` is
+        // borrowed.
         let slot = self.arm_of(frame);
         match self.arms[slot].1.take() {
             Some(arm) => {

@@ -165,6 +165,7 @@ impl<'a> Limits<'a> {
                 at.jerk([there.d[joint], there.dd[joint], ddd[joint]], bounds, rise, &name);
             }
         }
+        // Tool: speeds and accelerations, and the jerk along the path.
         if let Some([V, A]) = &there.tool {
             at.tool(V, A, piece);
             let most = self.rise.and_then(|rise| {

@@ -273,6 +273,7 @@ fn turned(owner: &mut Legs<'_>, leg: &Leg, angle: f64, at_end: bool) -> f64 {
     from_corner(owner, leg, angle, at_end, angle_between)
 }
 
+/// Angle of the rotation between two poses (rad).
 fn angle_between(a: &Pose, b: &Pose) -> f64 {
     rotation_vector((a.rotation * b.rotation.inverse()).matrix()).norm()
 }

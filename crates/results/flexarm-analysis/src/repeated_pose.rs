@@ -36,6 +36,8 @@ pub fn repeated_poses(holds: &[HoldMetrics]) -> Vec<RepeatedPose> {
     groups.iter().filter(|(_, errors)| errors.len() > 1).map(|(place, errors)| repeated(place, errors)).collect()
 }
 
+/// Accuracy and repeatability of a pose from the errors of its visits (m, world axes), as in ISO
+/// 9283: mean distance from their mean plus three standard deviations.
 fn repeated(place: &Vector3<f64>, errors: &[Vector3<f64>]) -> RepeatedPose {
     let n = errors.len() as f64;
     let mean = errors.iter().sum::<Vector3<f64>>() / n;

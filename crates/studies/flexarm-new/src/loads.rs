@@ -122,6 +122,7 @@ impl Workspace {
         let mut data = Data::new(model);
         let mut workspace =
             Self { moved: moved.clone(), poses: Vec::new(), weight: vec![0.0; n], inertia: vec![0.0; n] };
+        // Maxima of inertia and weight at each joint over the poses of a Halton sequence.
         for pose in 1..=POSES {
             let q = DVector::from_fn(n, |k, _| place(pose, k));
             let M = mass_matrix(model, &mut data, &q);

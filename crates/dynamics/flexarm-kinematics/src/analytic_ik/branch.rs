@@ -198,12 +198,14 @@ impl AnalyticArm {
         }
         let mut values = match &self.kernel {
             Kernel::Wrist(k) => {
+                // Both roots of the position problem, and the wrist beyond φ or not.
                 let [base, elbow] = self.arm_sides(&k.axes, k.form, &k.center, &q);
                 [base, elbow, self.beyond(k.fan.phi, q[4])]
             }
             Kernel::Parallel234(k) => {
                 let [s1, s2, s3, s4, s5, _] = &k.axes;
                 let (t2, t3, t4) = (s2.at(q[1]), s3.at(q[2]), s4.at(q[3]));
+                // Side of axis 1 on which the point of axis 6 lies, bend of the bars, and joint 5.
                 let point = t2.point(&t3.point(&t4.point(&s5.at(q[4]).point(&k.near.1))));
                 let base = s1.h.cross(&s2.h).dot(&(point - s1.o)) / k.reach;
                 [base, bend(s2, &s3.o, &t3.point(&s4.o), &s3.h), self.beyond(k.fan.phi, q[4])]
@@ -211,6 +213,8 @@ impl AnalyticArm {
             Kernel::Parallel123(k) => {
                 let [s1, s2, s3, s4, s5, s6] = &k.axes;
                 let (t4, t5) = (s4.at(q[3]), s5.at(q[4]));
+                // Bend of the bars, and the sides of joints 4 and 5 relative to the common
+                // direction.
                 let lever = t4.vector(&(k.near.1 - s4.o));
                 let fifth = t4.inverse().vector(&s1.h).dot(&s5.h.cross(&t5.vector(&s6.h)));
                 [bend(s1, &s2.o, &s2.at(q[1]).point(&s3.o), &s2.h), -s1.h.dot(&s4.h.cross(&lever)) / k.reach, -fifth]

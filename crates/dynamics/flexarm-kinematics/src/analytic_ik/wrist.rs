@@ -21,6 +21,8 @@ pub(crate) struct Wrist {
 }
 
 impl Wrist {
+    /// `center`: intersection of axes 4 to 6 at zero joint values (m, world); `reach`: size of the
+    /// arm (m).
     pub(crate) fn new(axes: [Screw; 6], center: Vector3<f64>, form: PositionForm, reach: f64) -> Self {
         let fan = CirclePlane::new(&axes[3].h, &axes[4].h, &axes[5].h);
         Self { axes, center, form, fan, reach }

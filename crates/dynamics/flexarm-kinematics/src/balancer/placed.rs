@@ -117,6 +117,8 @@ impl PlacedBalancer {
             BalancerPlace::Joint { parent, body, child, axis, .. } => {
                 let R = X_WB[*body].rotation;
                 let T = self.law.tension(x);
+                // A revolute joint takes a couple; a sliding one a force at the origin of the
+                // child.
                 if axis.angular.norm_squared() > 0.0 {
                     let moment = R * axis.angular * T;
                     let couple = |moment: Vector3<f64>| Wrench::new(Vector3::zeros(), moment);

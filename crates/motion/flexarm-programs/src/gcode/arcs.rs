@@ -36,15 +36,18 @@ impl Plane {
 /// Maximum distance of the arcs that replace a helix from it, m.
 const HELIX_ERROR: f64 = 1e-6;
 
-/// Arc of a circle, optionally with a rise along its axis.
+/// Arc of a circle, optionally with a rise along its axis; lengths in m, angles in rad.
 #[derive(Debug, Clone, Copy)]
 struct Helix {
     plane: Plane,
+    /// In the plane.
     centre: [f64; 2],
     radius: f64,
+    /// Angle of the start, from the first axis.
     from: f64,
     /// Positive counterclockwise.
     angle: f64,
+    /// Coordinate of the start along the third axis, and its change over the arc.
     start: f64,
     rise: f64,
 }

@@ -1,4 +1,7 @@
 //! Elements shared by the sheets: size, compass, colour bar and labels.
+//!
+//! Points and directions in link axes (m), sizes on the picture in pixels. Not here: the contents of
+//! the sheets (`interface_sheet`, `deflection_sheet`, `stress_sheet`).
 
 use nalgebra::Vector3;
 

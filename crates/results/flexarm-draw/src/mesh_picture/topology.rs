@@ -1,4 +1,7 @@
 //! Triangles without finite elements: prisms, smooth normals on curved faces, lines at edges.
+//!
+//! Positions in m, normals of unit length, both in the axes of the caller. Not here: the skin of a
+//! mesh ([`super::surface`]), drawing ([`super::scene`]).
 
 use nalgebra::Vector3;
 

@@ -213,6 +213,7 @@ fn materials(
     figures
 }
 
+/// Whether two materials differ in E, ν or ρ by more than 1e-6, relative.
 fn differ(a: &Material, b: &Material) -> bool {
     [(a.E, b.E), (a.nu, b.nu), (a.rho, b.rho)].into_iter().any(|(a, b)| (a - b).abs() > 1e-6 * a.abs().max(b.abs()))
 }

@@ -104,6 +104,7 @@ fn rosette(entry: &StrainGaugeEntry, links: StressLinks<'_>, source: &Source) ->
         );
         return Err(source.error(angles.span(), message));
     }
+    // One grid per angle, with a name of its own.
     let grid = |(k, angle): (usize, &f64)| {
         let repeated = angles.get_ref()[..k].contains(angle);
         let name = format!("{}_{angle}", gauge.name);

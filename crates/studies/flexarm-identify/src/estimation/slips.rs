@@ -247,6 +247,7 @@ fn place_rest(nominal: &NominalArm, measurements: &Measurements) -> Option<f64> 
         if q.len() < 5 {
             continue;
         }
+        // Pose of the instrument that fits its readings best.
         let X = rigid_fit(&p, &q)?;
         let mean = q.iter().sum::<Vector3<f64>>() / q.len() as f64;
         for (p, q) in p.iter().zip(&q) {
