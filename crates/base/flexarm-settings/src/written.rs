@@ -187,6 +187,7 @@ pub fn csv_fields(line: &str, is_separator: impl Fn(char) -> bool, runs: bool) -
     let (mut fields, mut field) = (Vec::new(), String::new());
     let (mut quoted, mut was_quoted, mut gap) = (false, false, false);
     let mut letters = line.chars().peekable();
+    // Ends a field: quoted text as it is, other text without blanks around it.
     let close = |field: &mut String, was_quoted: &mut bool| {
         let text = if *was_quoted { csv_text(field) } else { field.trim() }.to_owned();
         field.clear();

@@ -30,7 +30,7 @@ pub enum AxisMotion {
 }
 
 impl AxisMotion {
-    /// Unit vector of the joint axis.
+    /// Unit vector of the joint axis, in axes of the joint frame J.
     #[inline(always)]
     pub fn axis(self) -> Vector3<f64> {
         match self {

@@ -300,16 +300,19 @@ fn carry_columns<T: Real>(model: &Model, data: &mut Data<T>, i: usize) {
     let parent = &model.bodies[body.parent];
     let (r, own) = (&data.turned[i].r, &data.turned[body.parent]);
     let mut lower = Lower::of(&mut data.M, model);
+    // Wrenches about the parent's origin: t += r × f. Single-axis joints first.
     let range = body.columns.single.clone();
     for (F, column) in data.single[range.clone()].iter_mut().zip(&model.single[range]) {
         F.torque = add(&F.torque, &cross(r, &F.force));
         lower.meet(model, parent, own, *column, F);
     }
+    // Elastic joints: six wrenches at once.
     let range = body.columns.six.clone();
     for (F, column) in data.six[range.clone()].iter_mut().zip(&model.six[range]) {
         F.carry(r);
         lower.meet_six(model, parent, own, *column, F);
     }
+    // Modal bodies in the subtree: a wrench per mode.
     for (entry, modal) in model.modal.iter().zip(&mut data.modal) {
         if (i..body.subtree_end).contains(&entry.body) {
             for (k, F) in modal.columns.iter_mut().enumerate() {
@@ -495,6 +498,7 @@ impl<'m, T: Real> Lower<'m, T> {
         let (nv, whole) = (self.nv, self.nv / WIDE * WIDE);
         for c in (0..whole).step_by(WIDE) {
             let (own, outward) = self.M[c * nv..].split_at_mut(WIDE * nv);
+            // Entries within the diagonal block.
             for j in 1..WIDE {
                 let mut row = [T::zero(); WIDE];
                 for k in 0..j {
@@ -502,6 +506,7 @@ impl<'m, T: Real> Lower<'m, T> {
                 }
                 own[j * nv + c..][..j].copy_from_slice(&row[..j]);
             }
+            // Entries below the block: one row of four from four columns.
             let ((c0, c1), (c2, c3)) = {
                 let (first, second) = own.split_at(2 * nv);
                 (first.split_at(nv), second.split_at(nv))
@@ -512,6 +517,7 @@ impl<'m, T: Real> Lower<'m, T> {
                 to[c..c + WIDE].copy_from_slice(&[*x0, *x1, *x2, *x3]);
             }
         }
+        // Last columns, at most three.
         for c in whole..nv {
             for r in c + 1..nv {
                 self.M[r * nv + c] = self.M[c * nv + r];

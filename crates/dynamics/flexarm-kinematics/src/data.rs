@@ -62,7 +62,7 @@ pub struct Data<T: Scalar = f64> {
     pub X_WB: Vec<Pose<T>>,
     /// Twist `V_WB_B` of each body at Bo in B axes.
     pub V: Vec<Twist<T>>,
-    /// Spatial acceleration `As_WB_B`, minus gravity if the algorithm says so.
+    /// Spatial acceleration `As_WB_B` minus gravity, of the last inverse or forward dynamics.
     pub A: Vec<Twist<T>>,
     /// Wrench exerted by the joint on each body, at Bo in B axes ([`crate::inverse_dynamics`]).
     pub F: Vec<Wrench<T>>,
@@ -237,12 +237,14 @@ pub(crate) fn joint_position<T: Real>(model: &Model, data: &mut Data<T>, i: usiz
             data.X_PB[i] = pose(lift3(body.X_PJ.rotation.matrix()), lift(&body.X_PJ.translation.vector))
         }
         JointMotion::Elastic(angles) => {
+            // X_PB = X_PJ (R, d), with the rates of d in P axes: L = Rᵀ in B axes.
             let (R, B) = angles.pose(&Vector3::new(q[k + 3], q[k + 4], q[k + 5]));
             place_elastic(&mut data.X_PB[i], body, &R, &Vector3::new(q[k], q[k + 1], q[k + 2]));
             data.elastic[i] = ElasticSubspace { L: transposed(&R), B };
         }
         JointMotion::Interface { modal, interface } => {
             let modal = &model.modal[modal];
+            // Displacement d and small rotation φ of the interface from the modal coordinates.
             let moving = k..k + modal.tables.moving[interface];
             let (d, phi) = modal.tables.shapes.interfaces[interface].times(&q[moving]);
             let (R, B) = ElasticAngles::RotationVector.pose(&phi);

@@ -5,6 +5,9 @@
 //! excluded from it. Elastic coordinates keep their start values.
 //!
 //! Source: [Nakamura & Hanafusa 1986], [Wampler 1986]; damping update as in [Marquardt 1963].
+//!
+//! Not here: closed forms (`analytic_ik`), all solutions (`many_starts.rs`), redundant arms
+//! (`redundancy.rs`).
 
 use flexarm_spatial::{Pose, rotation_vector};
 use nalgebra::{DMatrix, DVector, Matrix6xX, Vector6};
@@ -57,7 +60,8 @@ pub struct IkError {
     pub at_limit: Vec<String>,
 }
 
-/// Finds joint values, nv long, that bring `frame` to `X_WT`, starting from `q_start` (nv long).
+/// Finds joint values, nv long, that bring `frame` to `X_WT`, starting from `q_start` (nv long; rad
+/// or m).
 ///
 /// # Errors
 /// [`IkError`] if the target is not reached within tolerance.

@@ -183,6 +183,8 @@ pub(crate) fn joint_columns<T: Real>(
         JointMotion::Welded => {}
         JointMotion::Elastic(_) => {
             let S = &data.elastic[i];
+            // Translations move Bo only, as the frame turns about it; rotations act on the angular
+            // part only.
             let (L, B) = (mul3(R, &S.L), mul3(R, &S.B));
             for c in 0..3 {
                 add(body.coordinate + c, column(&L, c), Vector3::zeros());
@@ -190,6 +192,7 @@ pub(crate) fn joint_columns<T: Real>(
             }
         }
         JointMotion::Interface { modal, interface } => {
+            // One column per mode that moves the interface.
             let (S, modal) = (&data.elastic[i], &model.modal[modal]);
             for c in 0..modal.n {
                 let column = modal.tables.shapes.interfaces[interface].twist(c, &S.L, &S.B);

@@ -282,12 +282,14 @@ impl<T: Real> ModalData<T> {
     #[inline(always)]
     pub(crate) fn place(&mut self, tables: &ModalTables, eta: &[T]) {
         let shapes = &tables.shapes;
+        // Symmetric part of (2), and Σ_l g_lk η_l of (4).
         for (q, p) in self.Q.iter_mut().zip(&tables.P) {
             *q = T::splat(*p);
         }
         tables.N.add_product(eta, &mut self.Q);
         self.g.fill(T::zero());
         tables.g.add_product(eta, &mut self.g);
+        // Sums over the modes: (1), E of (3), and (4).
         let (mut h, mut E) = (lift::<T>(&shapes.first_moment), [T::zero(); 6]);
         let matrices = self.Q.chunks_exact(6).zip(tables.P.chunks_exact(6)).zip(self.g.chunks_exact(3));
         for ((k, &eta_k), ((Q, P), g)) in eta.iter().enumerate().zip(matrices) {
@@ -297,6 +299,7 @@ impl<T: Real> ModalData<T> {
             }
             self.C_r[k] = add(&lift::<T>(&shapes.C_r[k]), &Vector3::new(g[0], g[1], g[2]));
         }
+        // tr(E) 1 - E, from the six numbers of E; off the diagonal, half of the stored sums.
         let half = T::splat(0.5);
         let ([x, y, z, ..], [.., xy, xz, yz]) = (E, E);
         let (xy, xz, yz) = (half * xy, half * xz, half * yz);

@@ -12,6 +12,8 @@
 //! only the tree. `Ṡ_B` is the time derivative of S in B axes: zero for single-DoF joints, but not for elastic
 //! ones. A modal body adds its inertia forces to (3) and to the forces of its coordinates, see
 //! [`crate::ModalBody`].
+//!
+//! Not here: the mass matrix (`crba.rs`), accelerations (`aba.rs`), stiffness of elastic joints.
 
 use flexarm_spatial::products::{cross, lift, scaled, tr_mul};
 use flexarm_spatial::{Real, SpatialInertia, Twist, Wrench};

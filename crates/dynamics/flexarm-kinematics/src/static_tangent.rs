@@ -187,10 +187,10 @@ impl<T: Real> StaticTangent<T> {
                 }
                 JointMotion::Interface { modal, interface } => {
                     let Phi = &model.modal[modal].tables.shapes.interfaces[interface].Phi;
-                    let of = |(c, Phi): (usize, nalgebra::MatrixView6x1<'_, f64>)| {
+                    let mode_column = |(c, Phi): (usize, nalgebra::MatrixView6x1<'_, f64>)| {
                         column(k + c, i, Phi.fixed_rows::<3>(0).into(), Phi.fixed_rows::<3>(3).into())
                     };
-                    columns.extend(Phi.column_iter().enumerate().map(of));
+                    columns.extend(Phi.column_iter().enumerate().map(mode_column));
                 }
             }
         }
@@ -424,15 +424,18 @@ impl StaticTangent {
         dtau: &mut [f64],
     ) -> Twist {
         assert_eq!(dtau.len(), self.size(model), "one change of force per coordinate of the tangent");
+        // The body moves with the subtree; closed loops add the motion of their joints.
         let mut twist = if model.is_in_subtree(observed, body) { *moved } else { Twist::zeros() };
         let Some(mut tangent) = self.loops.take() else {
             self.add_moved_in_tree(model, data, body, moved, dtau);
             return twist;
         };
+        // Forces of the opened tree, projected onto the independent coordinates.
         let mut dtree = vec![0.0; tangent.G.nrows()];
         self.add_moved_in_tree(model, data, body, moved, &mut dtree);
         let forces = (&self.tau_d[..], &mut dtree[..]);
         let rates = tangent.add_moved_subtree(model, data, self.first, (body, moved), forces, dtau);
+        // Twist due to the dependent joints between the root and the observed body.
         let n = self.size(model);
         for column in self.columns.iter().filter(|column| column.k >= n && model.is_in_subtree(observed, column.body)) {
             let rate = rates[column.k - n];

@@ -78,7 +78,7 @@ impl Plant {
         })
     }
 
-    /// Returns the arm with constant external loads: (body, wrench at Bo in world axes).
+    /// Returns the arm with constant external loads: (body, wrench at Bo in world axes; N, N m).
     ///
     /// # Errors
     /// As [`Plant::new`].

@@ -94,7 +94,7 @@ impl From<TorqueCurve> for SpringCurve {
 pub struct CurveError(String);
 
 impl TorqueCurve {
-    /// Creates a curve from points (deflection, torque).
+    /// Creates a curve from points (deflection in rad, torque in N m; of a slide m and N).
     ///
     /// # Errors
     /// [`CurveError`] for fewer than two points, values that are not finite, deflections that do
@@ -115,6 +115,7 @@ impl TorqueCurve {
                 ));
             }
         }
+        // The end pieces are continued, so they must rise.
         let n = points.len();
         let slope = |a: [f64; 2], b: [f64; 2]| (b[1] - a[1]) / (b[0] - a[0]);
         if slope(points[0], points[1]) <= 0.0 || slope(points[n - 2], points[n - 1]) <= 0.0 {
@@ -130,7 +131,7 @@ impl TorqueCurve {
         Self { x: vec![-reach, -half, half, reach], y: vec![-stiffness, 0.0, 0.0, stiffness] }
     }
 
-    /// Creates a linear spring.
+    /// Creates a linear spring with a stiffness in N m/rad, of a slide N/m.
     pub fn straight(stiffness: f64) -> Self {
         Self { x: vec![-1.0, 0.0, 1.0], y: vec![-stiffness, 0.0, stiffness] }
     }
@@ -192,7 +193,7 @@ impl TorqueCurve {
         }
     }
 
-    /// Returns the steepest slope: the stiffness for linear analyses.
+    /// Returns the steepest slope: the stiffness for linear analyses (N m/rad, N/m).
     pub fn stiffest(&self) -> f64 {
         (0..self.x.len() - 1).map(|k| (self.y[k + 1] - self.y[k]) / (self.x[k + 1] - self.x[k])).fold(0.0, f64::max)
     }

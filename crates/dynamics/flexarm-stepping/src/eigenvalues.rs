@@ -5,6 +5,8 @@
 //! by a division. Computes eigenvalues only; absolute errors are a few units in the last place of
 //! the largest one. For eigenvectors use nalgebra. Works on one matrix or on several in SIMD lanes;
 //! the result of a lane is bitwise that of its matrix by itself.
+//!
+//! Not here: the products of vectors (`dense`).
 
 use flexarm_kinematics::Real;
 

@@ -68,7 +68,7 @@ impl EquationsOfMotion {
         self.a.as_slice()
     }
 
-    /// Sets coordinates and velocities.
+    /// Sets coordinates (rad, m) and velocities (rad/s, m/s).
     ///
     /// # Panics
     /// If a slice has another length than [`EquationsOfMotion::x`].

@@ -47,11 +47,12 @@ pub struct EventQueue {
 impl EventQueue {
     /// Creates the queue for the start of a run.
     pub fn of(plant: &Plant) -> Self {
-        let loads = plant.loads.iter().flat_map(|load| {
-            let jumps = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
-            jumps.chain(load.wrench.stops.iter().copied())
+        // Times (s) at which a load or a velocity jumps.
+        let load_times = plant.loads.iter().flat_map(|load| {
+            let discontinuities = load.wrench.jumps.iter().copied().filter(|t| jumps_at(load, *t));
+            discontinuities.chain(load.wrench.stops.iter().copied())
         });
-        let mut jumps: Vec<f64> = loads.chain(plant.motion.velocity_jumps()).collect();
+        let mut jumps: Vec<f64> = load_times.chain(plant.motion.velocity_jumps()).collect();
         jumps.sort_by(f64::total_cmp);
         let clock = plant.servo.as_ref().map(|servo| SampleClock { sample_s: servo.sample_s, next: 0 });
         Self { jumps, jumps_over: 0, changes: plant.inertia_changes.clone(), changes_over: 0, clock }
@@ -62,7 +63,8 @@ impl EventQueue {
         Self { jumps: Vec::new(), jumps_over: 0, changes: plant.inertia_changes.clone(), changes_over: 0, clock: None }
     }
 
-    /// Returns the time of the next event after `t`, if any; exactly `end` if it is the same time.
+    /// Returns the time of the next event after `t` (s), if any; exactly `end` if it is the same
+    /// time.
     pub fn next(&self, t: f64, end: f64) -> Option<f64> {
         let change = self.changes.get(self.changes_over).map(|change| change.t);
         let sample = self.clock.as_ref().map(|clock| clock.after(t));
@@ -74,14 +76,14 @@ impl EventQueue {
         self.jumps.get(self.jumps_over).copied()
     }
 
-    /// Returns the time nearest to `t` strictly between the last jump and the next one.
+    /// Returns the time nearest to `t` (s) strictly between the last jump and the next one.
     pub fn side(&self, t: f64) -> f64 {
         let after = self.jumps_over.checked_sub(1).map_or(t, |k| t.max(self.jumps[k].next_up()));
         self.next_jump().map_or(after, |next| after.min(next.next_down()))
     }
 
-    /// Marks the jumps at `t` as over; returns the times just before the first and just after the
-    /// last of them.
+    /// Marks the jumps at `t` (s) as over; returns the times just before the first and just after
+    /// the last of them.
     pub fn pass_jumps(&mut self, t: f64) -> Option<(f64, f64)> {
         let first = self.next_jump().filter(|first| *first <= t + SAME_TIME)?;
         self.jumps_over = self.jumps.partition_point(|time| *time <= t + SAME_TIME);

@@ -11,6 +11,8 @@
 //! tubes outside the overlap. g is the clearance of the pads: the inner tube tilts by g/l from one
 //! side to the other as the moment passes M_0, over a width w of the moment.
 //! M(θ) is the solution of (1), which is unique since θ rises with M.
+//!
+//! Not here: files, damping, friction.
 
 /// Law of one axis of a guide; see the module documentation.
 #[derive(Clone, Copy, Debug, PartialEq)]

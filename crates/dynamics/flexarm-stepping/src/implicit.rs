@@ -16,6 +16,9 @@
 //!
 //! A step whose iteration fails is repeated with a matrix computed at its start, then in halves,
 //! down to `h/64`.
+//!
+//! Not here: the formulas of a method (`steppers`), the structure of the matrix
+//! (`iteration_matrix.rs`).
 
 use nalgebra::DVector;
 

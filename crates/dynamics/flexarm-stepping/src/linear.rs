@@ -101,7 +101,7 @@ impl Linear {
     }
 
     /// Returns the compliance as [`Linear::compliance`] does, with the stiffness of the servos
-    /// included. `None` if a motor is not held.
+    /// included. `None` if a motor is not held. Units as there.
     pub fn yielding_compliance(&self) -> Option<Matrix6<f64>> {
         let K = (&self.K + self.K.transpose()) * 0.5;
         let scale = K.diagonal().amax();
@@ -245,13 +245,13 @@ impl Servo {
         forward_kinematics(model, &mut data, &pose);
         StaticTangent::new(model, 0).compute(model, &data, &pose, &[], &mut K);
         let D = DMatrix::from_fn(m, m, |i, j| if i == j { viscous(friction, i) } else { 0.0 });
-        let of = |A: &DMatrix<f64>| {
+        let of_axes = |A: &DMatrix<f64>| {
             DMatrix::from_fn(self.axes.len(), m, |i, k| {
                 let axis = &self.axes[i];
                 axis.feed_forward * A[(axis.coordinate, k)]
             })
         };
-        [of(&K), of(&D), of(&M)]
+        [of_axes(&K), of_axes(&D), of_axes(&M)]
     }
 
     /// Returns the servo with zero gains and without feed-forward: the motors are free.

@@ -36,7 +36,8 @@ pub struct TimedWrench {
 }
 
 impl TimedWrench {
-    /// Creates a wrench in world axes, without jumps and without a period.
+    /// Creates a wrench in world axes (N, N m) over the time (s), without jumps and without a
+    /// period.
     pub fn new(value: impl Fn(f64) -> Wrench + Send + Sync + 'static) -> Self {
         let value = Arc::new(value);
         Self { axes: LoadAxes::World, value, jumps: Vec::new(), stops: Vec::new(), period: f64::INFINITY }
@@ -92,7 +93,7 @@ impl Load {
         Self { body, X_BF: Pose::identity(), wrench }
     }
 
-    /// Creates a constant load at the body's origin, in world axes.
+    /// Creates a constant load at the body's origin, in world axes (N, N m).
     pub fn constant(body: usize, F_W: Wrench) -> Self {
         Self::at_origin(body, TimedWrench::new(move |_| F_W))
     }

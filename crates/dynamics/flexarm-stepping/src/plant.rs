@@ -6,6 +6,8 @@
 //!
 //! The free coordinates x of a plant are those of the joints driven by torque, followed by the
 //! elastic ones. All other joints are prescribed.
+//!
+//! Not here: state, events, or anything that changes during a run (`reduced`).
 
 use std::sync::Arc;
 
@@ -37,7 +39,7 @@ pub struct Spring {
 }
 
 impl Spring {
-    /// Creates a linear spring.
+    /// Creates a linear spring. `K`: square, on the coordinates of the spring (N/m, N m/rad).
     pub fn linear(name: impl Into<String>, K: DMatrix<f64>, damping: Damping) -> Self {
         Self { name: name.into(), K, damping, curve: None, hysteresis: None, geometric: None }
     }
@@ -256,7 +258,7 @@ impl Plant {
     }
 
     /// Returns the stiffness on the elastic coordinates: blocks of the elements plus cross
-    /// stiffness of coupled gears. Nonlinear springs contribute their `K`.
+    /// stiffness of coupled gears. Nonlinear springs contribute their `K`. n×n; N/m, N m/rad.
     pub fn stiffness(&self) -> DMatrix<f64> {
         let n = self.model.n_elastic();
         let mut K = DMatrix::zeros(n, n);

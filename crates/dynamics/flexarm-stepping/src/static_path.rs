@@ -1,5 +1,8 @@
 //! Static equilibria along a motion: each one starts from the previous one and reuses its inverse
 //! tangent stiffness.
+//!
+//! Start at [`StaticPath::at`]. Not here: a single equilibrium (`statics.rs`), equilibria at many
+//! unrelated poses (`operating_point`).
 
 use std::sync::Arc;
 
@@ -81,7 +84,8 @@ impl StaticPath {
         self.balanced(t)
     }
 
-    /// Returns the coordinates just before `t`: events at that time are still pending.
+    /// Returns the coordinates just before `t` (s), in m and rad: events at that time are still
+    /// pending.
     ///
     /// # Errors
     /// As [`static_equilibrium`].

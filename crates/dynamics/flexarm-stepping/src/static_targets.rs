@@ -132,11 +132,13 @@ pub fn static_targets(
 fn lead(servo: &Servo, q: &mut [f64], holding: &DVector<f64>) -> Result<(), TargetError> {
     let (motors, n) = (q.to_vec(), servo.rigid.nv());
     let sagging = |axis: &&ServoAxis| axis.integral_gain * axis.position_gain == 0.0;
+    // Without gain, no offset of the target makes a torque.
     if let Some(axis) = servo.axes.iter().filter(sagging).find(|axis| axis.position_gain * axis.velocity_gain <= 0.0) {
         let joint = servo.rigid.coordinates()[axis.coordinate].joint.clone();
         return Err(TargetError::NothingHolds { joint });
     }
     let (mut data, mut state) = (Data::new(&servo.rigid), State::zeros(&servo.rigid));
+    // Fixed-point iteration, since the torque fed forward depends on the target.
     for _ in 0..MAX_ITERATIONS {
         state.q.copy_from_slice(q);
         let fed = inverse_dynamics(&servo.rigid, &mut data, &state, &DVector::zeros(n)).clone();

@@ -17,7 +17,8 @@ use crate::error::StepError;
 use crate::geometric::add_geometric_forces;
 use crate::plant::Plant;
 
-/// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`.
+/// Computes the elastic coordinates at which the springs carry gravity and the loads at time `t`
+/// (s), n long (m, rad).
 ///
 /// Inertia forces are neglected: the drives are held at the position of the motion at `t`.
 ///
@@ -314,6 +315,7 @@ impl StaticSlopes {
         self.exact.add_moved_subtree(&plant.model, data, moved, observed, p)
     }
 
+    /// Writes the derivative of the static forces into `G` by central differences.
     fn difference(
         &mut self,
         plant: &Plant,

@@ -114,6 +114,7 @@ impl Rotation {
         slopes
     }
 
+    /// Linearises the arm about the steady rotation.
     fn linearise(&mut self, tool: &Frame, found: Equilibrium, rates: &[f64]) -> Result<SteadyRotation, StepError> {
         let Equilibrium { e, residual, iterations } = found;
         let e = &e;

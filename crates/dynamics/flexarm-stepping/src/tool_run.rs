@@ -48,6 +48,7 @@ pub struct ToolDeflection {
 }
 
 impl ToolDeflection {
+    /// Adds the deflection of the tool (m, world axes) at t (s).
     fn include(&mut self, t: f64, deflection: Vector3<f64>, keep: bool) {
         let square = deflection.norm_squared();
         // Sum of squares until the end of the run.

@@ -219,6 +219,7 @@ fn plants_text(found: &Compensation) -> String {
     lines(&t)
 }
 
+/// Formats a compensation: method, peaks, limits, files.
 fn text(found: &Compensation) -> String {
     let mut out =
         format!("{} on {}: {} method, {} iterations", found.motion, found.robot, found.method, found.iterations);

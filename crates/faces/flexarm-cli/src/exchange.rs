@@ -61,6 +61,7 @@ fn export_robot(terminal: &Terminal, args: &ExportArgs) -> Result<ExitCode, Fail
     Ok(ExitCode::SUCCESS)
 }
 
+/// Makes the job of the flags.
 fn import_job(args: &ImportArgs) -> Result<ImportJob, Failure> {
     let usage = |flag: &'static str| move |error: WordError| Failure::Usage(format!("{flag}: {error}"));
     let masses = match (&args.part_a, &args.part_b, args.mass, &args.com, &args.inertia) {

@@ -138,13 +138,14 @@ pub(crate) fn run(terminal: &Terminal, args: &IdentifyArgs) -> Result<ExitCode, 
 
 /// Parses three numbers from each text.
 fn threes(flag: &str, what: &str, texts: &[String]) -> Result<Vec<[f64; 3]>, Failure> {
-    let of = |text: &String| match flexarm::links::reduce::numbers(text).as_deref() {
+    let triple = |text: &String| match flexarm::links::reduce::numbers(text).as_deref() {
         Ok([x, y, z]) => Ok([*x, *y, *z]),
         _ => Err(Failure::Usage(format!("{flag} {text:?}: expected {what}"))),
     };
-    texts.iter().map(of).collect()
+    texts.iter().map(triple).collect()
 }
 
+/// Plans measurements.
 fn plan(terminal: &Terminal, args: &IdentifyArgs, robot: &Robot, count: usize) -> Result<ExitCode, Failure> {
     let folder = OutputFolder::of(args.output.as_deref(), &format!("{}_plan", robot.name), !args.no_files)?;
     let forces = threes("--pull", "a force of three numbers", &args.forces)?;
@@ -288,6 +289,7 @@ fn encoder_line(gear: &EncoderFigures) -> String {
     )
 }
 
+/// Table of the planned readings.
 fn plan_text(found: &MeasurementPlan) -> String {
     let mut out =
         format!("{}: {} readings of {} candidate poses\n\n", found.robot, found.poses.len(), found.candidates);

@@ -187,6 +187,7 @@ fn joint_range(text: &str, robot: &Robot) -> Result<JointRange, Failure> {
     Ok(JointRange { joint: joint.trim().to_owned(), range: [from, to], points })
 }
 
+/// Returns the places of the map: a motion, poses, joint ranges or a box.
 fn region(args: &MapArgs, robot: &Robot) -> Result<MapRegion, Failure> {
     if let Some(motion) = &args.along {
         let motion = Motion::load_with(shipped::trajectory(motion)?, robot, &args.input.options())?;

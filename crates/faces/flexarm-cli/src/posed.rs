@@ -101,6 +101,7 @@ fn triple(values: &[f64], scale: f64) -> Vec<String> {
     values.iter().map(|x| format!("{:.4}", scale * x)).collect()
 }
 
+/// Formats sag, displacement and compliance at a pose.
 fn statics_text(s: &Statics) -> String {
     let mut out = pose_text(&s.robot, &s.joints, &s.at, "") + &format!("TCP on {}, world axes\n", s.tcp);
     let mut t = table(&["", "x [mm]", "y [mm]", "z [mm]", "rx [mrad]", "ry [mrad]", "rz [mrad]"]);
@@ -130,6 +131,7 @@ fn statics_text(s: &Statics) -> String {
     out
 }
 
+/// Formats the modes at a pose.
 fn modes_text(m: &ModeTable) -> String {
     let turning = m.joints.iter().zip(&m.speeds).filter(|(_, speed)| **speed != 0.0);
     let turning: Vec<String> = turning.map(|(joint, speed)| format!("{joint} at {speed:.4} 1/s")).collect();
@@ -200,6 +202,7 @@ fn direction(tcp: &[f64; 6]) -> String {
     AXES[..3].iter().zip(&tcp[..3]).filter_map(part).collect::<Vec<_>>().join(" ")
 }
 
+/// Formats the peaks of the responses.
 fn response_text(r: &Response) -> String {
     let mut out = pose_text(&r.robot, &r.joints, &r.at, ", other drives locked");
     let head = ["from", "to", "unit", "at rest"].into_iter().map(str::to_owned);

@@ -138,6 +138,7 @@ fn value(value: f64, unit: &str) -> String {
 /// Number of frequencies shown for each parameter.
 const FREQUENCIES: usize = 3;
 
+/// Formats the derivatives at a pose.
 fn pose_text(found: &PoseSensitivity) -> String {
     let at: Vec<String> = found.joints.iter().zip(&found.at).map(|(joint, q)| format!("{joint} = {q:.4}")).collect();
     let mut out = format!("{} at {}\n", found.robot, at.join(", "));

@@ -16,7 +16,9 @@ use crate::shipped::OutputFolder;
 use crate::terminal::{Bar, Terminal, answer_as_is, columns, to_json};
 use crate::{formats, print, shipped, signals, study, summary_table};
 
-/// `line`: the command line as given.
+/// Runs `flexarm run` and `flexarm compare`.
+///
+/// * `line`: the command line as given.
 pub(crate) fn run(
     terminal: &Terminal,
     args: &RunArgs,

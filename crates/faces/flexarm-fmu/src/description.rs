@@ -140,6 +140,7 @@ fn numbers(variable: &Variable, is_state: bool, first: usize) -> Vec<(&'static s
     all.into_iter().filter_map(|(name, value)| Some((name, value?))).collect()
 }
 
+/// Writes a variable of FMI 3.0.
 fn variable_3(xml: &mut Xml, reference: usize, variable: &Variable, is_state: bool) -> io::Result<()> {
     let reference = reference.to_string();
     let kind = if variable.kind == Kind::Real { "Float64" } else { "Boolean" };
@@ -161,6 +162,7 @@ fn variable_3(xml: &mut Xml, reference: usize, variable: &Variable, is_state: bo
     Ok(())
 }
 
+/// Writes a variable of FMI 2.0.
 fn variable_2(xml: &mut Xml, reference: usize, variable: &Variable, is_state: bool) -> io::Result<()> {
     let reference = reference.to_string();
     let kind = if variable.kind == Kind::Real { "Real" } else { "Boolean" };

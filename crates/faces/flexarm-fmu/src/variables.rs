@@ -128,10 +128,10 @@ pub(crate) struct StateReferences {
 
 impl StateReferences {
     pub(crate) fn of(variables: &[Variable]) -> Self {
-        let of = |reference: usize| variables[reference].derivative_of;
+        let state_of = |reference: usize| variables[reference].derivative_of;
         let all = |is_acceleration: bool| {
-            let derivatives = (0..variables.len()).filter_map(move |own| Some((own, of(own)?)));
-            derivatives.filter(move |(_, state)| of(*state).is_some() == is_acceleration)
+            let derivatives = (0..variables.len()).filter_map(move |own| Some((own, state_of(own)?)));
+            derivatives.filter(move |(_, state)| state_of(*state).is_some() == is_acceleration)
         };
         let (derivatives, states) = all(false).chain(all(true)).unzip();
         Self { states, derivatives }

@@ -43,11 +43,11 @@ pub(crate) fn issue(py: Python<'_>, caveats: &[Finding]) -> PyResult<()> {
     level.set_item("stacklevel", 1)?;
     // Caveats of one kind become one warning, with the fields of the first.
     let texts: Vec<String> = warnings.iter().map(|caveat| caveat.message.clone()).collect();
-    let of = |text: String| {
+    let finding = |text: String| {
         let first = warnings.iter().find(|caveat| text.starts_with(&caveat.message));
         Finding { message: text, ..first.cloned().unwrap_or_default() }
     };
-    let warnings: Vec<Finding> = gathered(&texts).into_iter().map(of).collect();
+    let warnings: Vec<Finding> = gathered(&texts).into_iter().map(finding).collect();
     for caveat in list(py, &warnings)? {
         warn.call((caveat,), Some(&level))?;
     }

@@ -207,9 +207,9 @@ pub(crate) fn compensate<'py>(
         ..CompensateRequest::default()
     };
     let scenario = scenario(robot, motion, loads, payloads, None)?;
-    let of = robot.get().robot.clone();
+    let loaded = robot.get().robot.clone();
     let name = format!("{}_compensated", scenario.motion.name);
-    let found = stoppable(py, move |stop| compensate_motion_until(&of, scenario, &request, stop))?.or_raise()?;
+    let found = stoppable(py, move |stop| compensate_motion_until(&loaded, scenario, &request, stop))?.or_raise()?;
     caveat::answer(py, &found, &found.caveats)?;
     // The commands as a motion that other calls take.
     let motion = Motion::along((*found.trajectory).clone(), &name, &robot.get().robot).or_raise()?;

@@ -74,12 +74,12 @@ pub(crate) fn load_motion(
     let columns = args.columns.as_deref().map(str::parse).transpose();
     let columns = columns.map_err(|error| PyValueError::new_err(format!("columns: {error}")))?;
     let options = MotionOptions { topic: args.topic.clone(), columns };
-    let of = robot.get().robot.clone();
+    let loaded = robot.get().robot.clone();
     let corners = args.round_corners;
     let motion = py.detach(|| -> Result<Motion, flexarm::Error> {
-        let motion = Motion::load_with(&file, &of, &options)?;
+        let motion = Motion::load_with(&file, &loaded, &options)?;
         match corners {
-            Some(seconds) => motion.with_rounded_corners(seconds, &*of.rigid_model()?),
+            Some(seconds) => motion.with_rounded_corners(seconds, &*loaded.rigid_model()?),
             None => Ok(motion),
         }
     });

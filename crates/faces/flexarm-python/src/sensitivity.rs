@@ -65,7 +65,7 @@ pub(crate) fn sensitivity<'py>(
         overwrite,
     };
     let scenario = scenario(robot, motion, loads, payloads, None)?;
-    let of = robot.get().robot.clone();
-    let found = py.detach(move || slopes(&of, scenario, &request)).or_raise()?;
+    let loaded = robot.get().robot.clone();
+    let found = py.detach(move || slopes(&loaded, scenario, &request)).or_raise()?;
     caveat::answer(py, &found, &found.caveats)
 }

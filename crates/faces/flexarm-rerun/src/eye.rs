@@ -49,6 +49,7 @@ pub(crate) fn eye(header: &RunHeader, first: Option<&Sample>) -> Option<Eye> {
         }
         None => (Vector3::zeros(), Vector3::x()),
     };
+    // Box around the first sample, for a recording without the volume of the run.
     let around_first = || {
         let points = first.into_iter().flat_map(|sample| sample.flexible.X_WL.iter().chain([&sample.flexible.X_WT]));
         let mut corners: Option<[[f64; 3]; 2]> = None;
@@ -65,6 +66,7 @@ pub(crate) fn eye(header: &RunHeader, first: Option<&Sample>) -> Option<Eye> {
     if !(radius.is_finite() && radius > 0.0) {
         return None;
     }
+    // Look from the side and from above, at an angle to the direction from base to tool.
     let to_tool = tool - base;
     let ahead = Vector3::new(to_tool.x, to_tool.y, 0.0).try_normalize(0.05 * radius).unwrap_or_else(Vector3::x);
     let aside = Rotation3::from_axis_angle(&Vector3::z_axis(), TURN_RAD) * ahead;

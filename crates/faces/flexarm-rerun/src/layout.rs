@@ -2,6 +2,8 @@
 //!
 //! Written as entities of a blueprint: the SDK's builder (`rerun::blueprint`) cannot set the camera
 //! and the background of a 3D view, the legend and the axis of a plot, and the columns of a log.
+//!
+//! Not here: which views there are (`window`), ranges of axes (`plot_range`).
 
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, PanelBlueprint, PlotLegend, ScalarAxis, TextLogColumns, TimeAxis,

@@ -1,5 +1,8 @@
 //! One of the robots of a recording: rigid twin, flexible arm, or flexible arm with magnified
 //! deflections.
+//!
+//! Start at [`RobotTracks`]. Poses in the world (m); a link is an entity with its mesh, moved by a
+//! transform per sample. Not here: numbers and plots (`curves`), buffering of rows (`tracks`).
 
 use flexarm_kinematics::{Pose, rotation_vector};
 use nalgebra::{Point3, Vector3};
@@ -122,6 +125,7 @@ impl RobotTracks {
         stream.name_frame(&self.look.root.join(&path(["tcp"])), &format!("{prefix}{}/tcp", header.tcp))
     }
 
+    /// Adds the mesh of a link: rigid, or in pieces before, within and behind a bend.
     fn surface(&mut self, header: &RunHeader, mesh: &LinkMesh, stream: &RrdStream) -> Result<()> {
         let entity = self.look.root.join(&path([&link_part(&header.links[mesh.link].name), &mesh.name]));
         let mut first = 0;

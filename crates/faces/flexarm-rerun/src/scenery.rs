@@ -42,6 +42,7 @@ pub(super) fn write(stream: &RrdStream, scenery: &Scenery) -> Result<()> {
     stream.constant(&path([ROOT, view, &scenery.name]), &*archetype(&scenery.form))
 }
 
+/// Converts a form of the scenery to that of the viewer.
 fn archetype(form: &SceneryForm) -> Box<dyn AsComponents> {
     let color = |[r, g, b, a]: &[u8; 4]| Color::from_unmultiplied_rgba(*r, *g, *b, *a);
     match form {

@@ -2,6 +2,8 @@
 //!
 //! Start at [`Track`]. A track keeps rows until they are worth a chunk, and leaves out rows that
 //! repeat the one before. Times in ns of simulated time; poses in the world, single precision (m).
+//!
+//! Not here: what the rows show (`robot`, `curves`).
 
 use flexarm_kinematics::Pose;
 use nalgebra::UnitQuaternion;

@@ -337,6 +337,7 @@ fn lumped_parts(flexible: &FlexibleLink, site: &Site) -> Result<Chain, Substitut
         }
     };
     let Parts::FromLink(split) = flexible.parts else { return Ok(chain) };
+    // Cut the mechanism's own inertia along the line from A to B.
     let own = site.own(&flexible.link)?;
     let cut = match &flexible.form {
         LinkForm::Chain(_) => cut_chain(&own, &site.p_LA, &site.p_LB, &chain.parts),
@@ -345,6 +346,7 @@ fn lumped_parts(flexible: &FlexibleLink, site: &Site) -> Result<Chain, Substitut
     if let Some(parts) = cut {
         return Ok(Chain { parts, ..chain });
     }
+    // It cannot be cut: scale the parts of the beam, and add the rest as bodies at the two ends.
     let SharedInertia { share, ends: [near, far] } = shared(flexible, site)?;
     let mut parts: Vec<RigidPart> = chain.parts.iter().map(|part| part.with_mass(share * part.mass)).collect();
     let last = parts.len() - 1;

@@ -453,6 +453,7 @@ fn put_start(message: &Received, lines: &mut [Line], caveats: &mut FileCaveats<'
         let k = start.joints.iter().position(|joint| **joint == *line.joint)?;
         start.position.get(k).copied().filter(|q| q.is_finite())
     };
+    // All joints or none.
     let places: Option<Vec<f64>> = lines.iter().map(place).collect();
     match places {
         Some(places) => {
@@ -510,6 +511,8 @@ impl Line {
         }
     }
 
+    /// Appends a column of points at their times after `from` (s); a point at the end of the
+    /// trajectory before it must agree with it.
     fn append(&mut self, from: f64, points: &[Point], column: usize, number: usize) -> Result<(), PlacedProblem> {
         for point in points {
             let t = from + point.time_s;

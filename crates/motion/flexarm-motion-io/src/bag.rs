@@ -142,6 +142,7 @@ fn read_files(files: &[PathBuf], bag: &Path, request: &Request<'_>) -> Result<Me
     finish(collector, &shown, format, &broken)
 }
 
+/// Makes the motion of the collected messages; broken files of the bag are named in caveats.
 fn finish(
     collector: Collector<'_>,
     shown: &str,

@@ -66,6 +66,7 @@ impl Bytes<'_> {
         Ok(Node::new(Value::Map(pairs), BYTES))
     }
 
+    /// Reads a field: one value, a fixed number, or a sequence.
     fn field(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, String> {
         let cut = || format!("it ends within `{}`", field.name);
         let count = match field.many {
@@ -86,6 +87,7 @@ impl Bytes<'_> {
         Ok(Node::new(Value::Numbers(numbers.ok_or_else(cut)?), BYTES))
     }
 
+    /// Reads one value.
     fn value(&mut self, definitions: &Definitions, field: &Field, depth: usize) -> Result<Node, String> {
         let cut = || format!("it ends within `{}`", field.name);
         let value = match &field.kind {

@@ -165,6 +165,7 @@ fn fields(text: &str, package: &str) -> Vec<Field> {
     fields
 }
 
+/// Kind of a type name in a message definition; types without a package are of `package`.
 fn kind_of(word: &str, package: &str) -> Kind {
     // `string<=10` is a string.
     let word = word.split_once("<=").map_or(word, |(word, _)| word);

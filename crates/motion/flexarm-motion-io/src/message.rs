@@ -122,6 +122,7 @@ fn trajectories(node: &Node, depth: usize, found: &mut Vec<Points>) -> Result<()
     }
 }
 
+/// Reads the points of a `JointTrajectory`: times in s, values per joint.
 fn points(node: &Node, names: &Node, list: &Node) -> Result<Points, PlacedProblem> {
     let joints = names_of(names, "joint_names")?;
     let items: &[Node] = match &list.value {
@@ -239,6 +240,7 @@ fn check_lengths(
     Ok(())
 }
 
+/// Reads a list of joint names.
 fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, PlacedProblem> {
     let wrong = |node: &Node| wrong(key, node, "a list of names of joints");
     let names: Vec<Rc<str>> = match &node.value {
@@ -265,6 +267,7 @@ fn names_of(node: &Node, key: &str) -> Result<Vec<Rc<str>>, PlacedProblem> {
     }
 }
 
+/// Reads a list of numbers.
 fn numbers(node: &Node, key: &str) -> Result<Vec<f64>, PlacedProblem> {
     match &node.value {
         Value::Numbers(numbers) => Ok(numbers.clone()),

@@ -67,6 +67,7 @@ fn failed(error: &rusqlite::Error) -> PlacedProblem {
     PlacedProblem::new(format!("the SQLite file cannot be read: {error}"))
 }
 
+/// Collects the messages of a database in the order of reception; returns why it ends early, if so.
 fn collect(database: &Connection, most: u64, into: &mut Collector<'_>) -> Result<Option<String>, PlacedProblem> {
     let tables = names_of_tables(database).map_err(|error| failed(&error))?;
     let has = |table: &str| tables.iter().any(|name| name == table);

@@ -74,10 +74,13 @@ pub(crate) enum Inside {
     Database(Vec<u8>),
 }
 
+/// Unpacks a compressed recording, and recognises its format.
+///
 /// * `most`: maximum size of the content, bytes.
 pub(crate) fn inside_of(path: &Path, most: u64) -> Result<Inside, MotionError> {
     let failed = |source| MotionError::Read { path: path.to_owned(), source };
     let mut stream = BufReader::new(open_packed(path, most).map_err(failed)?);
+    // The first bytes give the format; they are put back in front of the stream.
     let mut head = [0; 16];
     let mut filled = 0;
     while filled < head.len() {

@@ -32,6 +32,7 @@ impl From<YamlError> for PlacedProblem {
     }
 }
 
+/// Converts a YAML node; equal keys share their text.
 fn node<'t>(YamlNode { line, column, value }: YamlNode<'t>, keys: &mut HashMap<Cow<'t, str>, Rc<str>>) -> Node {
     let value = match value {
         YamlValue::Scalar { text, is_plain: true, .. } => plain(&text),

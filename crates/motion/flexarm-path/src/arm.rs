@@ -136,11 +136,11 @@ impl ProgramArm<'_> {
     /// Zeros and senses of six joints, for configuration words that refer to the controller's axes.
     /// Coupling to another axis is ignored.
     pub(crate) fn controller_axes(&self, joints: [usize; 6]) -> ControllerAxes {
-        let of = |k: usize| {
+        let controller_axis = |k: usize| {
             let n = self.axes.iter().position(|&axis| axis == k);
             *n.and_then(|n| self.controller.get(n)).unwrap_or(&ControllerAxis::SAME)
         };
-        let axes = joints.map(of);
+        let axes = joints.map(controller_axis);
         ControllerAxes { sign: axes.map(|axis| axis.sense), offset: axes.map(|axis| -axis.sense * axis.zero) }
     }
 }

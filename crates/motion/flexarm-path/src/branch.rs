@@ -3,6 +3,8 @@
 //! Solutions are in closed form if the arm has one ([`AnalyticArm`]), otherwise found numerically
 //! from many starts. The solution nearest to the current joint values is chosen if the target does
 //! not specify more.
+//!
+//! Not here: the solutions along a path (`follow.rs`).
 
 use flexarm_kinematics::{
     AnalyticArm, ControllerAxes, Data, Frame, IkOptions, Model, Selection, Solutions, forward_kinematics,
@@ -54,6 +56,8 @@ impl<'m> Branches<'m> {
         if let Configuration::Near(values) = configuration {
             program_arm.set_axes(values, &mut near);
         }
+        // Closed form if the frame has one, else a search. The arm is taken out while `self` is
+        // borrowed.
         let slot = self.arm_of(frame);
         match self.arms[slot].1.take() {
             Some(arm) => {
@@ -76,6 +80,7 @@ impl<'m> Branches<'m> {
         })
     }
 
+    /// Chooses among all solutions in closed form.
     fn in_closed_form(
         &mut self,
         arm: &AnalyticArm,
@@ -102,6 +107,7 @@ impl<'m> Branches<'m> {
         answer
     }
 
+    /// Searches the nearest solution numerically; it cannot name a branch.
     fn search(
         &mut self,
         frame: &Frame,

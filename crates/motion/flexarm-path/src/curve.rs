@@ -250,6 +250,7 @@ struct Circle {
 }
 
 impl Circle {
+    /// Arc from p0 through p1 to p2 (m).
     fn through(p0: &Vector3<f64>, p1: &Vector3<f64>, p2: &Vector3<f64>) -> Result<Self, ArcError> {
         let (a, b) = (p1 - p0, p2 - p0);
         let longest = a.norm().max(b.norm()).max((b - a).norm());

@@ -18,6 +18,8 @@ pub(crate) struct JerkBounded {
 }
 
 impl JerkBounded {
+    /// Computes the law along a route.
+    ///
     /// * `points`: bounds at the stations.
     /// * `rise`: rise time of the acceleration of joints without a given jerk limit (s).
     pub(crate) fn new(points: &[PathPoint], route: &Route, arm: &ProgramArm<'_>, rise: f64) -> Result<Self, LawError> {

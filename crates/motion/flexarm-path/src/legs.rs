@@ -134,6 +134,7 @@ impl<'m> Legs<'m> {
     ) -> Result<Vec<Leg>, Box<Finding>> {
         let mut legs: Vec<Leg> = Vec::new();
         while let Some(Item::Move(of)) = items.get(*k) {
+            // Neighbouring spline moves form one leg.
             let group = spline_group(items, *k);
             if group.is_empty() {
                 *k += 1;
@@ -165,6 +166,7 @@ impl<'m> Legs<'m> {
         self.tool_leg(of, frame, curve, start)
     }
 
+    /// Path of the TCP of a move from pose X0, both in the base of the arm.
     fn tool_curve(&mut self, of: &Move, X0: &Pose) -> Result<ToolCurve, Box<Finding>> {
         let X_MB = base_of(&self.arm, of);
         let X1 = match &of.to {
@@ -218,6 +220,8 @@ impl<'m> Legs<'m> {
         Ok(q)
     }
 
+    /// Leg of a joint move; `None` for the first move if the arm was not known to be anywhere
+    /// before.
     fn joint_leg(&mut self, of: &Move, start: &mut Start) -> Result<Option<Leg>, Box<Finding>> {
         let frame = tool_of(&self.arm, of);
         let q1 = match &of.to {

@@ -1,5 +1,9 @@
 //! Bounds at the stations of a route: joint limits, torques and tool limits, and which of them
 //! slows a move.
+//!
+//! Start at `Limits::at_stations`. Bounds are on the square of the speed along the path parameter,
+//! and on its derivatives. Not here: the speed itself (`schedule.rs`, and the time laws of
+//! `flexarm-trajectory`).
 
 use flexarm_kinematics::{Data, State, inverse_dynamics};
 use flexarm_trajectory::jerk_law::{JerkBound, PathBounds};
@@ -78,6 +82,7 @@ impl<'a> Limits<'a> {
             let [first, last] = piece.stations;
             for k in first..=last {
                 let Station { s, q, d, before, after } = &route.stations[k];
+                // Second and third derivatives jump at a station: take those of the piece.
                 let dd = if k == first { after } else { before };
                 let ddd = self.rise.map(|_| route.joints(if k == first { k } else { k - 1 }, *s).1);
                 let tool = piece.tool.get(k - first).map(|tool| [tool.V, tool.A]);
@@ -151,6 +156,7 @@ impl<'a> Limits<'a> {
         PathBounds { x_max: point.x_max, bounds: point.bounds, jerks }
     }
 
+    /// Adds the bounds of joints, tool and torques at a station.
     fn collect(&mut self, piece: &Piece, there: &PathState<'_>, at: &mut AtStation<'_>) {
         for (joint, bounds) in self.arm.bounds.iter().enumerate() {
             let name = || self.arm.model.coordinates()[joint].joint.clone();
@@ -159,6 +165,7 @@ impl<'a> Limits<'a> {
                 at.jerk([there.d[joint], there.dd[joint], ddd[joint]], bounds, rise, &name);
             }
         }
+        // Tool: speeds and accelerations, and the jerk along the path.
         if let Some([V, A]) = &there.tool {
             at.tool(V, A, piece);
             let most = self.rise.and_then(|rise| {
@@ -200,6 +207,7 @@ impl AtStation<'_> {
         self.point.x_max = self.point.x_max.min(x);
     }
 
+    /// Bounds of a joint with `q' = d`, `q'' = dd`: speed, and acceleration `d s̈ + dd ṡ²`.
     fn joint(&mut self, d: f64, dd: f64, bounds: &JointBounds, piece: &Piece, name: &dyn Fn() -> String) {
         let speed = &piece.speed;
         let is_joint_move = piece.tool.is_empty();
@@ -237,6 +245,7 @@ impl AtStation<'_> {
         }
     }
 
+    /// Bounds of the TCP: programmed speeds, and accelerations along the path.
     fn tool(&mut self, V: &Vector6<f64>, A: &Vector6<f64>, piece: &Piece) {
         let speed = &piece.speed;
         let three = |six: &Vector6<f64>, row: usize| Vector3::new(six[row], six[row + 1], six[row + 2]);

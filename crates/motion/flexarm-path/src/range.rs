@@ -1,5 +1,7 @@
 //! Checks that the numbers of a program are finite and within the range of a robot, which bounds
 //! the work of planning.
+//!
+//! Not here: limits of the robot (`limits.rs`).
 
 use flexarm_spatial::Pose;
 use flexarm_trajectory::LONGEST;

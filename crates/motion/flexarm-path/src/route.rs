@@ -157,9 +157,9 @@ impl Route {
                 let near =
                     self.stations.last().map_or_else(|| self.legs[stretch.leg].q0.clone(), |last| last.q.clone());
                 let follower = owner.follower(&way.frame, &near);
-                let of = &self.legs[stretch.leg].of;
+                let leg_move = &self.legs[stretch.leg].of;
                 let walked = walk(follower, way, stretch.range, &near, &options);
-                let (points, sigma) = walked.map_err(|blocked| blocked_error(of, &way.curve, blocked))?;
+                let (points, sigma) = walked.map_err(|blocked| blocked_error(leg_move, &way.curve, blocked))?;
                 let tool = points.iter().map(|(s, _)| way.curve.at(*s)).collect();
                 (points, tool, Some(sigma))
             }
@@ -211,6 +211,7 @@ fn corner(a: &Leg, b: &Leg, jerks: bool) -> Corner {
     if let (LegPath::Tool(way), LegPath::Tool(next)) = (&a.way, &b.way)
         && way.frame.X_BF == next.frame.X_BF
     {
+        // Unit tangents and curvatures where the two paths meet.
         let (end, start) = (way.curve.at(a.length), next.curve.at(0.0));
         if (end.V - start.V).norm() <= ALIGNED {
             return match (jerks && (end.A - start.A).norm() > CURVED, a.of.blend) {
@@ -272,6 +273,7 @@ fn turned(owner: &mut Legs<'_>, leg: &Leg, angle: f64, at_end: bool) -> f64 {
     from_corner(owner, leg, angle, at_end, angle_between)
 }
 
+/// Angle of the rotation between two poses (rad).
 fn angle_between(a: &Pose, b: &Pose) -> f64 {
     rotation_vector((a.rotation * b.rotation.inverse()).matrix()).norm()
 }

@@ -372,7 +372,7 @@ impl<'r> Schedule<'r> {
     fn planned(&self, leg: usize, by_leg: &[[Option<usize>; 2]], now: f64) -> PlannedMove {
         let route = self.route;
         let span = self.span(leg, by_leg);
-        let of = &route.legs[leg].of;
+        let leg_move = &route.legs[leg].of;
         // The piece of the leg, or its blend if the blends leave nothing of it.
         let own = by_leg[leg][0].or(by_leg[leg][1]).map(|k| &route.pieces[k]);
         let (mut top, mut slowed): (Option<f64>, Option<Slowed>) = (None, None);
@@ -392,11 +392,11 @@ impl<'r> Schedule<'r> {
             }
         }
         PlannedMove {
-            place: of.place.clone(),
-            statement: of.statement.clone(),
+            place: leg_move.place.clone(),
+            statement: leg_move.statement.clone(),
             span_s: span.map(|t| now + t),
             top_m_s: top,
-            programmed_m_s: of.speed.linear_m_s,
+            programmed_m_s: leg_move.speed.linear_m_s,
             slowed,
             least_sigma: least_sigma.map(|(sigma, s)| (sigma, now + self.time_of(s))),
             blend_m: route.blends[leg],

@@ -101,6 +101,7 @@ fn read_recorded(
     let Some(language) = options.language.or_else(|| recognise(bytes, &name)) else {
         return Err(ProgramError::Unknown { path: path.to_owned() });
     };
+    // The reader may add further files to the texts.
     let mut texts = vec![Text::new(path, &decode(bytes))];
     let read = match language {
         Language::Krl => krl::read(&mut texts, options),

@@ -33,7 +33,7 @@ pub struct Corner {
     pub position: f64,
 }
 
-/// Returns the corners of positions q at times t, in ascending order.
+/// Returns the corners of positions q (rad or m) at times t (s), in ascending order.
 pub fn corners(t: &[f64], q: &[f64]) -> Vec<Corner> {
     let samples = Samples::new(t, q);
     let mut corners = Vec::new();

@@ -21,6 +21,7 @@ impl Trajectory {
         let times = self.row_times(rate_hz, MAX_ROWS)?;
         writeln!(out, "# unit: rad")?;
         writeln!(out, "# time: s")?;
+        // Columns: time, positions, velocities, accelerations.
         let mut header = vec!["time".to_owned()];
         header.extend(self.joints().iter().cloned());
         header.extend(self.joints().iter().map(|joint| format!("{joint}.vel")));

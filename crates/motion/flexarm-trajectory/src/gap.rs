@@ -37,8 +37,8 @@ pub struct Gap {
 impl Gap {
     /// Returns the gap of a motion with times `start + factor t`.
     pub(crate) fn at_times(&self, start: f64, factor: f64) -> Self {
-        let of = |t: f64| start + factor * t;
-        Self { from_s: of(self.from_s), to_s: of(self.to_s), usual_s: factor * self.usual_s, ..self.clone() }
+        let scaled = |t: f64| start + factor * t;
+        Self { from_s: scaled(self.from_s), to_s: scaled(self.to_s), usual_s: factor * self.usual_s, ..self.clone() }
     }
 
     pub(crate) fn warning(&self) -> Finding {

@@ -149,21 +149,21 @@ pub fn least_time_with_jerks(
     let mut law = QuinticLaw::along(law, stations, ROUNDS[0].0 * step(law.duration()));
     for (round, gap) in ROUNDS {
         law = law.divided(round * step(law.duration()));
-        let of = intervals(stations, &law.s);
-        law = law.improved(gap, &mut |k, s| place(of[k], s));
+        let interval = intervals(stations, &law.s);
+        law = law.improved(gap, &mut |k, s| place(interval[k], s));
     }
     // Tightens bounds that are violated between the places at which they are enforced.
-    let of = intervals(stations, &law.s);
-    let mut drawn = vec![[1.0; 2]; of.len()];
+    let interval = intervals(stations, &law.s);
+    let mut drawn = vec![[1.0; 2]; interval.len()];
     for _ in 0..DRAWN {
-        let slowing = law.slowing(&mut |k, s| place(of[k], s));
+        let slowing = law.slowing(&mut |k, s| place(interval[k], s));
         if slowing.iter().flatten().all(|slowing| *slowing <= 1.0 + PASSED) {
             break;
         }
         for (drawn, slowing) in drawn.iter_mut().flatten().zip(slowing.iter().flatten()) {
             *drawn *= slowing.max(1.0);
         }
-        law = law.improved(DRAWN_GAP, &mut |k, s| place(of[k], s).drawn_in(drawn[k]));
+        law = law.improved(DRAWN_GAP, &mut |k, s| place(interval[k], s).drawn_in(drawn[k]));
     }
     // The whole motion is slowed until no violation is left.
     let slowing = law.slowing(&mut |k, s| place(of[k], s));
@@ -173,11 +173,11 @@ pub fn least_time_with_jerks(
 /// Returns the station interval that contains each interval between nodes.
 fn intervals(stations: &[f64], nodes: &[f64]) -> Vec<usize> {
     let last = stations.len() - 2;
-    let of = |pair: &[f64]| {
+    let interval_of = |pair: &[f64]| {
         let middle = 0.5 * (pair[0] + pair[1]);
         (stations.partition_point(|s| *s <= middle).max(1) - 1).min(last)
     };
-    nodes.windows(2).map(of).collect()
+    nodes.windows(2).map(interval_of).collect()
 }
 
 /// Motion along a path: parameter, speed and acceleration at given times, with quintics between
@@ -296,15 +296,15 @@ impl QuinticLaw {
     ///
     /// * `place`: bounds at a parameter of interval `k`.
     pub fn slowing(&self, place: &mut dyn FnMut(usize, f64) -> PathBounds) -> Vec<[f64; 2]> {
-        let mut of = |k: usize, parts: usize| {
+        let mut slowing_of = |k: usize, parts: usize| {
             let h = (self.t[k + 1] - self.t[k]) / parts as f64;
             let at = (0..=parts).map(|i| self.within(k, h * i as f64));
             at.map(|at| place(k, at.s).slowing(&at)).fold([0.0; 2], larger)
         };
         (0..self.t.len() - 1)
-            .map(|k| match of(k, CHECKED[0]) {
+            .map(|k| match slowing_of(k, CHECKED[0]) {
                 far if far[0].max(far[1]) < NEAR => far,
-                _ => of(k, CHECKED[1]),
+                _ => slowing_of(k, CHECKED[1]),
             })
             .collect()
     }

@@ -2,6 +2,8 @@
 //!
 //! Start at [`Leg::curves`]: unit shapes (`shape`, or `via` for moves through via points) times the
 //! travel of each joint.
+//!
+//! Not here: the sequence of the moves (`plan`), the time-optimal law (`optimal`).
 
 use flexarm_settings::Finding;
 
@@ -132,6 +134,7 @@ impl Leg<'_> {
             );
             return Err(PlanError::Invalid { number: Some(number), message });
         }
+        // Spline through the points over unit time, at rest at both ends.
         let (points, weights, moving) = self.points();
         let u = via::passing_times(&points, &weights).map_err(|via| PlanError::repeated_point(number, via))?;
         let unit_curve = |i: usize| {
@@ -140,6 +143,7 @@ impl Leg<'_> {
         };
         let unit: Vec<Curve> = (0..self.joints.len()).map(unit_curve).collect();
 
+        // Duration as given, or the shortest within the limits.
         let duration = match planned.duration {
             Some(duration) => duration,
             None => {

@@ -1,5 +1,8 @@
 //! Checks a trajectory against the limits of its joints: all violations, each with its time and
 //! size.
+//!
+//! Start at [`Trajectory::check_limits`](crate::Trajectory::check_limits). Not here: limits in
+//! planning (`plan`), torques.
 
 use flexarm_settings::Finding;
 

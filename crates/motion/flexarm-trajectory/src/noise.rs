@@ -44,8 +44,8 @@ pub struct Noise {
     pub cutoff_hz: f64,
 }
 
-/// Estimates the noise of evenly sampled positions from their fourth differences; `None` if the
-/// samples are uneven, few or smooth.
+/// Estimates the noise of positions `q` (rad or m), sampled evenly at `t` (s), from their fourth
+/// differences; `None` if the samples are uneven, few or smooth.
 pub fn noise(t: &[f64], q: &[f64]) -> Option<Noise> {
     let n = q.len();
     if n < MIN_SAMPLES + 4 {
@@ -153,22 +153,22 @@ fn smoothing_spline(t: &[f64], q: &[f64], fixed: [bool; 2], cutoff_hz: f64) -> V
     let (mut d, mut lower, mut second, mut x) = (vec![0.0; m], vec![0.0; m], vec![0.0; m], vec![0.0; m]);
     for j in 0..m {
         let [one, two] = [1, 2].map(|back| j.checked_sub(back));
-        let of = |at: Option<usize>, values: &[f64]| at.map_or(0.0, |k| values[k]);
-        let (l1, l2) = (of(one, &lower), of(two, &second));
-        let (d1, d2) = (of(one, &d), of(two, &d));
+        let entry = |at: Option<usize>, values: &[f64]| at.map_or(0.0, |k| values[k]);
+        let (l1, l2) = (entry(one, &lower), entry(two, &second));
+        let (d1, d2) = (entry(one, &d), entry(two, &d));
         d[j] = (h[j] + h[j + 1]) / 3.0 + lambda * gram(j, j) - l1 * l1 * d1 - l2 * l2 * d2;
         if j + 1 < m {
-            lower[j] = (h[j + 1] / 6.0 + lambda * gram(j, j + 1) - l1 * of(one, &second) * d1) / d[j];
+            lower[j] = (h[j + 1] / 6.0 + lambda * gram(j, j + 1) - l1 * entry(one, &second) * d1) / d[j];
         }
         if j + 2 < m {
             second[j] = lambda * gram(j, j + 2) / d[j];
         }
         let slope = |i: usize| (q[i + 1] - q[i]) / h[i];
-        x[j] = slope(j + 1) - slope(j) - l1 * of(one, &x) - l2 * of(two, &x);
+        x[j] = slope(j + 1) - slope(j) - l1 * entry(one, &x) - l2 * entry(two, &x);
     }
     for j in (0..m).rev() {
-        let of = |k: usize| x.get(k).copied().unwrap_or(0.0);
-        x[j] = x[j] / d[j] - lower[j] * of(j + 1) - second[j] * of(j + 2);
+        let solved = |k: usize| x.get(k).copied().unwrap_or(0.0);
+        x[j] = x[j] / d[j] - lower[j] * solved(j + 1) - second[j] * solved(j + 2);
     }
     let mut smooth = q.to_vec();
     for (j, second) in x.iter().enumerate() {

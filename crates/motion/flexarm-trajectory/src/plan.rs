@@ -12,6 +12,8 @@
 //! **No duration**: the move is as fast as the limits allow. If synchronised, all joints follow one
 //! common shape (a straight line in joint space) under the strictest limits; otherwise each joint
 //! has its own shape and the slowest joint determines the duration.
+//!
+//! Not here: files of waypoints (`waypoints`), paths of the tool (crate `flexarm-path`).
 
 use flexarm_settings::Finding;
 

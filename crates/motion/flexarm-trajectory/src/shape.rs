@@ -16,6 +16,8 @@
 //! Trapezoid and S-curve are both seven-phase: a trapezoid rounds a fixed fraction of its ramps
 //! (`t_jerk = rounding t_ramp / 2`; without rounding the acceleration jumps), an S-curve rounds by
 //! a jerk limit (`t_jerk = a / jerk`).
+//!
+//! Not here: moves through via points (`via`), the time-optimal law (`optimal`).
 
 use crate::curve::Curve;
 use crate::polynomial::Piece;

@@ -22,6 +22,8 @@
 //! two, and the joint's curve is cut there: either side has its own spline with an end of constant
 //! acceleration, and the velocity jumps in between. Given velocities and accelerations next to a
 //! corner are not used, since it is unknown which side they belong to.
+//!
+//! Not here: reading the samples (`table`), gaps in them (`gap.rs`), noise (`noise.rs`).
 
 use std::borrow::Cow;
 

@@ -199,7 +199,8 @@ impl Lines {
     }
 }
 
-/// Returns the squared speeds `x` of the time-optimal law, one per point, from `x = 0` to `x = 0`.
+/// Returns the squared speeds `x = (ds/dt)²` of the time-optimal law, one per point, from `x = 0`
+/// to `x = 0`.
 ///
 /// With fewer than 4000 intervals, each one is divided, and the bounds are interpolated linearly in
 /// between. The cost is that of two passes over the points with all their bounds.

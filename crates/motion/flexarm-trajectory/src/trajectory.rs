@@ -3,6 +3,8 @@
 //!
 //! Start at [`Trajectory::sample`]. Trajectories are built by [`crate::Plan`] and
 //! [`crate::Samples`] and do not change afterwards.
+//!
+//! Not here: planning (`plan`), splines through samples (`spline`), limits (`limits`), files.
 
 use flexarm_settings::{Finding, Place};
 

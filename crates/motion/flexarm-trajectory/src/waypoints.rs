@@ -75,6 +75,7 @@ impl Trajectory {
             fail(error.span().map(|span| span.start), fault("toml", message))
         };
         let line = |offset: usize| line_and_column(text, offset).0;
+        // Samples of a motion.
         if has_samples(text) {
             let file: SamplesFileToml = toml::Deserializer::parse(text).and_then(exact).map_err(unread)?;
             if *file.format.get_ref() != 1 {
@@ -85,6 +86,7 @@ impl Trajectory {
         }
         let file: FileToml = toml::Deserializer::parse(text).and_then(exact).map_err(unread)?;
 
+        // Moves between waypoints: an error of planning is located at its move.
         let Checked { plan, unusual_limit, move_offsets } =
             check(&file, limits).map_err(|error| fail(error.offset, error.fault))?;
         let planned = plan.build().map_err(|error| {

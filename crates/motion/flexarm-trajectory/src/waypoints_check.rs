@@ -226,6 +226,7 @@ impl Context<'_> {
         let usable = |value: f64| if value > 0.0 { value } else { f64::INFINITY };
         let mut limits = vec![MotionLimits::UNLIMITED; self.joints.len()];
         for ((limit, joint), scale) in limits.iter_mut().zip(&self.joints).zip(&self.scales) {
+            // Limits of the robot; those of the file replace them.
             if let Some((_, robot)) = known.iter().find(|(name, _)| name == joint) {
                 limit.velocity = usable(robot.velocity);
                 limit.acceleration = usable(robot.acceleration);

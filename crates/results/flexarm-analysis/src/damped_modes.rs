@@ -8,6 +8,8 @@
 //! `Φᵀ K Φ = diag μ`, with `z = (s η, η̇)` and `s = sqrt|μ|`. The norm of the first-order matrix is
 //! then proportional to the highest frequency, not to its square, so that low modes stay accurate
 //! next to stiff ones. Start at [`damped_modes`].
+//!
+//! Not here: response to an input (`linear_system.rs`), tracking of modes over poses.
 
 use std::f64::consts::TAU;
 

@@ -49,7 +49,7 @@ pub fn rainflow(history: &[f64]) -> Vec<FatigueCycle> {
 }
 
 /// Counts the cycles of a history that repeats without end: the same from its maximum to the next
-/// one, so that every cycle is whole.
+/// one, so that every cycle is whole. Amplitude and mean have the unit of the history.
 ///
 /// # Source
 /// [ASTM E1049], section 5.4.5.

@@ -18,6 +18,8 @@
 //! of the motors and the torques that they need in addition to the feed-forward; the servo commands
 //! for these follow from a small differential equation (`servo`), which is as stable as the servos
 //! themselves.
+//!
+//! Not here: matrices of the arm, which the caller linearises; input shaping (`shaping.rs`).
 
 use nalgebra::{Complex, DMatrix};
 
@@ -183,7 +185,7 @@ impl Inversion {
         self.cutoff_hz
     }
 
-    /// Returns the part of an error (k×N, `step_s` apart) above the cutoff.
+    /// Returns the part of an error (k×N, `step_s` (s) apart) above the cutoff.
     pub fn quicker_than_cutoff(&self, y: &DMatrix<f64>, step_s: f64) -> DMatrix<f64> {
         if y.ncols() == 0 {
             return y.clone();
@@ -212,7 +214,7 @@ impl Inversion {
             derivatives.push(derivative(&derivatives[order - 1], step_s));
         }
         // Σ A_i y⁽ⁱ⁾ of the series `terms`, for `count` columns from `first`.
-        let of = |terms: fn(&Series) -> &[DMatrix<f64>; ORDER], rows: usize, first: usize, count: usize| {
+        let applied = |terms: fn(&Series) -> &[DMatrix<f64>; ORDER], rows: usize, first: usize, count: usize| {
             let mut sum = DMatrix::zeros(rows, count);
             for column in 0..count {
                 let time = (first + column) as f64 - pad as f64;
@@ -224,10 +226,10 @@ impl Inversion {
             }
             sum
         };
-        let mut u = of(|series| &series.A, m, pad, N);
+        let mut u = applied(|series| &series.A, m, pad, N);
         if let Some(servo) = self.servos.first() {
             // Starts before the motion begins, so that it is reached at rest.
-            let torques = of(|series| &series.torques, servo.axes.len(), 0, pad + N);
+            let torques = applied(|series| &series.torques, servo.axes.len(), 0, pad + N);
             let at =
                 |column: usize| NodeServo::between(&self.servos, self.nodes_at((column as f64 - pad as f64) * step_s));
             let ahead = NodeServo::leads(at, &torques, step_s);

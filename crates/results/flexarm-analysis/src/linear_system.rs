@@ -124,7 +124,7 @@ pub enum Spacing {
     Linear,
 }
 
-/// Returns frequencies from `from` to `to`, both included, ascending; at least two.
+/// Returns frequencies from `from` to `to`, both included, ascending, in their unit; at least two.
 ///
 /// With [`Spacing::Logarithmic`] `from` must be positive.
 pub fn frequency_grid(from: f64, to: f64, points: usize, spacing: Spacing) -> Vec<f64> {
@@ -225,8 +225,9 @@ pub struct ResponsePeak {
     pub magnitude: f64,
 }
 
-/// Finds the local maxima of `magnitude` over a grid of frequencies, each refined between its
-/// neighbours by golden-section search; the highest first. The ends of the grid are not peaks.
+/// Finds the local maxima of `magnitude` over a grid of frequencies (ascending, any unit), each
+/// refined between its neighbours by golden-section search; the highest first. The ends of the grid
+/// are not peaks.
 ///
 /// * `grid`: ascending, fine enough that each peak has its own point ([`with_resonances`]).
 /// * `values`: magnitudes there, one per frequency. `magnitude`: the same function, anywhere.

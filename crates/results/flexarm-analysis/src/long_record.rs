@@ -166,7 +166,7 @@ impl LongRecord {
         }
     }
 
-    /// Returns the maximum magnitude of the translation in each of `pieces` equal pieces of the
+    /// Returns the maximum magnitude of the translation (m) in each of `pieces` equal pieces of the
     /// record, fewer if it has fewer samples.
     #[must_use]
     pub fn largest_errors(&self, pieces: usize) -> Vec<f64> {

@@ -112,8 +112,9 @@ impl Shaper {
         let mut times: Vec<f64> = (0..=2 * half).map(|k| step * k as f64).collect();
         let size = modes.iter().map(|mode| mode.vibration).fold(0.0, f64::max);
         let left = |shaper: &Shaper| {
-            let of = |mode: &ShapedMode, f: f64| mode.vibration * shaper.residual_at(f * mode.hz, mode.ratio, delay_s);
-            modes.iter().flat_map(|mode| within(band).into_iter().map(move |f| of(mode, f))).fold(0.0, f64::max)
+            let residual =
+                |mode: &ShapedMode, f: f64| mode.vibration * shaper.residual_at(f * mode.hz, mode.ratio, delay_s);
+            modes.iter().flat_map(|mode| within(band).into_iter().map(move |f| residual(mode, f))).fold(0.0, f64::max)
         };
         let mut best: Option<OptimalShaper> = None;
         for _ in 0..=REFINEMENTS {
@@ -143,6 +144,7 @@ impl Shaper {
     }
 }
 
+/// Checks that the numbers are positive and in range, and the delay not too long for the search.
 fn check(modes: &[ShapedMode], delay_s: f64, band: f64) -> Result<(), ShaperError> {
     let wrong = |what, found, expected| Err(ShaperError::Value { what, found, expected });
     if modes.is_empty() {

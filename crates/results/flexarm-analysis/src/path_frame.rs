@@ -9,6 +9,8 @@
 //!
 //! World axes, SI units. Start at [`PathFrame::next`] sample by sample, at [`path_frames`] for a
 //! whole record.
+//!
+//! Not here: the error itself (`pose_error.rs`).
 
 use nalgebra::Vector3;
 
@@ -90,7 +92,8 @@ impl PathFrame {
         Self { tangential, normal, binormal }
     }
 
-    /// Returns the components of a world vector along the tangential, normal and binormal axis.
+    /// Returns the components of a world vector along the tangential, normal and binormal axis. In
+    /// the unit of `v`.
     pub fn components(&self, v: &Vector3<f64>) -> [f64; 3] {
         [self.tangential.dot(v), self.normal.dot(v), self.binormal.dot(v)]
     }
@@ -131,7 +134,8 @@ pub fn path_frames(times: &[f64], positions: &[[f64; 3]]) -> Vec<PathFrame> {
     (0..n).map(rates).map(next).collect()
 }
 
-/// Computes only the tangential axis of [`path_frames`] at one sample.
+/// Computes only the tangential axis of [`path_frames`] at one sample. Times in s, positions in the
+/// world (m); a unit vector.
 pub fn tangential_at(times: &[f64], positions: &[[f64; 3]], sample: usize) -> Vector3<f64> {
     let n = times.len().min(positions.len());
     if n < 3 {

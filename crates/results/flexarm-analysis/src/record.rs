@@ -114,6 +114,7 @@ impl ErrorRecord<'_> {
             let (previous, this) = (self.times[index - 1], self.times[index]);
             return Err(RecordError::TimeNotIncreasing { index, previous, this });
         }
+        // Moves follow each other without overlap.
         let mut last_end = f64::NEG_INFINITY;
         for (index, &(start, end)) in self.moves.iter().enumerate() {
             if !(start.is_finite() && end.is_finite() && last_end <= start && start <= end) {

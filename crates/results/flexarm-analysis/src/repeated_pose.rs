@@ -22,8 +22,8 @@ pub struct RepeatedPose {
     pub repeatability_m: f64,
 }
 
-/// Returns the poses with two or more rests, ordered by their first rest; the attained position is
-/// that at the end of a rest.
+/// Returns the poses with two or more rests, ordered by their first rest; the attained position
+/// (world, m) is that at the end of a rest.
 pub fn repeated_poses(holds: &[HoldMetrics]) -> Vec<RepeatedPose> {
     let mut groups: Vec<(Vector3<f64>, Vec<Vector3<f64>>)> = Vec::new();
     for hold in holds {
@@ -36,6 +36,8 @@ pub fn repeated_poses(holds: &[HoldMetrics]) -> Vec<RepeatedPose> {
     groups.iter().filter(|(_, errors)| errors.len() > 1).map(|(place, errors)| repeated(place, errors)).collect()
 }
 
+/// Accuracy and repeatability of a pose from the errors of its visits (m, world axes), as in ISO
+/// 9283: mean distance from their mean plus three standard deviations.
 fn repeated(place: &Vector3<f64>, errors: &[Vector3<f64>]) -> RepeatedPose {
     let n = errors.len() as f64;
     let mean = errors.iter().sum::<Vector3<f64>>() / n;

@@ -51,7 +51,7 @@ impl NodeServo {
         }
     }
 
-    /// Returns `C + F`, d×d.
+    /// Returns `C + F` at `s` (1/s), d×d (N m/rad).
     #[doc(hidden)]
     pub fn references(&self, s: Complex<f64>) -> DMatrix<Complex<f64>> {
         let mut all = self.feed_forward(s).select_columns(&self.axes);

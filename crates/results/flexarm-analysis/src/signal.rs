@@ -77,7 +77,8 @@ impl Section {
     }
 }
 
-/// Computes the derivative by central differences, one-sided at the ends; NaN for a single value.
+/// Computes the derivative of values `step_s` (s) apart by central differences, one-sided at the
+/// ends; NaN for a single value.
 ///
 /// Returns as many values, per second.
 pub fn derivative(x: &[f64], step_s: f64) -> Vec<f64> {

@@ -132,8 +132,10 @@ struct Tapered {
 }
 
 impl Tapered {
+    /// Tapers a signal (times in s) for the transform.
     fn new(times: &[f64], signal: &[[f64; 3]], taper: Taper) -> Self {
         let scale = signal.iter().flatten().fold(0.0, |peak: f64, x| peak.max(x.abs()));
+        // Equal intervals of time. A longer signal is cut at its end, or averaged over blocks.
         let (mut samples, step) = match taper {
             Taper::FadeOut => {
                 let n = times.len().min(MAX_SAMPLES);
@@ -147,6 +149,7 @@ impl Tapered {
         };
 
         let n = samples.len() as f64;
+        // Taper; the mean that it weights is subtracted first.
         let shape = |k: usize| match taper {
             Taper::FadeOut => (0.5 * PI * k as f64 / n).cos().powi(2),
             Taper::Both => (PI * (k as f64 + 0.5) / n).sin().powi(2),

@@ -289,6 +289,7 @@ fn cut_along(mesh: &mut LinkMesh, line: &BendLine) {
     let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
     let mut open = std::mem::take(&mut mesh.triangles);
     while let Some(triangle) = open.pop() {
+        // Extent of each edge along the line; the longest one is halved.
         let spans = [0, 1, 2].map(|k| {
             let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
             (place(&mesh.positions[a as usize]) - place(&mesh.positions[b as usize])).abs()
@@ -299,6 +300,7 @@ fn cut_along(mesh: &mut LinkMesh, line: &BendLine) {
             continue;
         }
         let [a, b, c] = [0, 1, 2].map(|k| triangle[(longest + k) % 3]);
+        // Neighbouring triangles share the middle of their common edge.
         let middle = *middles.entry((a.min(b), a.max(b))).or_insert_with(|| {
             let mean = |x: [f32; 3], y: [f32; 3]| [0, 1, 2].map(|k| 0.5 * (x[k] + y[k]));
             mesh.positions.push(mean(mesh.positions[a as usize], mesh.positions[b as usize]));

@@ -52,7 +52,7 @@ impl Magnifier {
         Self { factor, carriers, bends, tcp }
     }
 
-    /// Returns the magnification factor.
+    /// Returns the magnification factor. 1 draws deflections as they are.
     #[must_use]
     pub fn factor(&self) -> f64 {
         self.factor

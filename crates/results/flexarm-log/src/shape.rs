@@ -20,7 +20,7 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// Returns the sizes that a header asks for.
+    /// Returns the sizes of the samples that belong to a header.
     pub fn of(header: &RunHeader) -> Self {
         Self {
             joints: header.joints.len(),

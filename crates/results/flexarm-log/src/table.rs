@@ -66,6 +66,7 @@ pub(crate) fn distinct(name: String, taken: &mut BTreeSet<String>) -> String {
 pub(crate) fn fill_row(sample: &Sample, shape: &Shape, row: &mut Vec<f64>) {
     let has_rigid = shape.has_rigid;
     row.clear();
+    // TCP of both robots, and its error with its causes.
     row.push(sample.time_s);
     if has_rigid {
         row.extend(sample.rigid.X_WT.translation.vector.iter());
@@ -79,6 +80,7 @@ pub(crate) fn fill_row(sample: &Sample, shape: &Shape, row: &mut Vec<f64>) {
         row.extend(sample.static_m);
     }
     row.extend(sample.contributions.iter().flatten());
+    // Joints, elastic elements, gauges, energies.
     for (joint, q) in sample.flexible.q.iter().enumerate() {
         row.push(*q);
         row.push(sample.flexible.effort[joint]);

@@ -3,6 +3,8 @@
 //!
 //! All poses are in the world; SI units; six-vectors linear first. "Flexible" is the simulated
 //! robot, "rigid" its twin with every elastic coordinate held at zero.
+//!
+//! Not here: how a run is computed (`flexarm-run`), formats of recordings (`flexarm-log`).
 
 use std::path::PathBuf;
 

@@ -2,6 +2,8 @@
 //!
 //! Frames: L link, V the visual's own frame. Primitives as in URDF: centred at Vo, the cylinder
 //! along z.
+//!
+//! Not here: formats of meshes (`mesh`), masses from volumes (`inertia.rs`).
 
 use std::path::PathBuf;
 

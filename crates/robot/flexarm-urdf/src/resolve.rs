@@ -2,6 +2,8 @@
 //!
 //! Order for packages: the caller's map, the parent folders of the URDF, the caller's search paths.
 //! Only [`search_paths_from_environment`], which the caller may use, reads the environment.
+//!
+//! Not here: reading the files, packages on the network.
 
 use std::path::{Path, PathBuf};
 

@@ -87,6 +87,7 @@ pub(crate) fn inspect(robot: &RawRobot, visuals: &[Visual], report: &mut Report)
             let mut bounds: Option<Bounds> = None;
             let mut solids = Ok(Vec::new());
             for (raw, visual) in link.visuals.iter().zip(visuals.by_ref()) {
+                // One visual without a solid leaves the link without mass properties.
                 match meshes.inspect(visual, &raw.place, report) {
                     Ok(((low, high), solid)) => {
                         bounds = Some(bounds.map_or((low, high), |b| (b.0.inf(&low), b.1.sup(&high))));

@@ -66,10 +66,10 @@ impl StaticFigures {
     /// matrices.
     pub(crate) fn stiffness_tables(&self, number: fn(f64) -> String) -> [ReportTable; 3] {
         // 1 kN and mm, 1 kN m and mrad.
-        let of = |k: usize| number(1e6 * self.compliance[k][k]);
+        let compliance = |k: usize| number(1e6 * self.compliance[k][k]);
         let rows = vec![
-            vec!["displacement of B under 1 kN".into(), of(0), of(1), of(2), "mm".into()],
-            vec!["rotation of B under 1 kN m".into(), of(3), of(4), of(5), "mrad".into()],
+            vec!["displacement of B under 1 kN".into(), compliance(0), compliance(1), compliance(2), "mm".into()],
+            vec!["rotation of B under 1 kN m".into(), compliance(3), compliance(4), compliance(5), "mrad".into()],
         ];
         [
             ReportTable::new("deflection of B along the load, A held", &["", "x", "y", "z", ""], rows),

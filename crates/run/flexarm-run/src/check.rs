@@ -199,6 +199,7 @@ fn check_motion(robot: &Robot, path: &Path, options: &MotionOptions, findings: &
                 Finding { help: help.into(), likely: likely(), ..error }
             };
             findings.extend(motion.violations.iter().map(passed));
+            // Checks of the rigid robot along the motion.
             let mut caveats = motion.caveats();
             if let Ok(model) = robot.rigid_model() {
                 let closed = loops::along_motion(&model, &motion.trajectory);

@@ -247,6 +247,8 @@ fn in_table(table: &DeTable<'_>, name: &str, check: Check<'_>) -> Option<(Range<
     })
 }
 
+/// Finds the first number of a value that the check refuses: its place and the message.
+///
 /// * `name`: path of the keys, joined by dots.
 fn in_value(value: &Spanned<DeValue<'_>>, name: &str, check: Check<'_>) -> Option<(Range<usize>, String)> {
     let number: f64 = match value.get_ref() {

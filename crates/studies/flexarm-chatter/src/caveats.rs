@@ -104,7 +104,7 @@ const TOO_DAMPED: &[Factor] = &[(100.0, "per cent")];
 pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
     // The cutter: sizes, engagement, coefficients, angles.
     let name = format!("the tool {:?}", tool.name);
-    let of = |what: &str| format!("{what} of {name}");
+    let named = |what: &str| format!("{what} of {name}");
     let cutter = &tool.cutter;
     let arc = cutter.engagement.exit - cutter.engagement.entry;
     let k = &cutter.coefficients;
@@ -117,7 +117,7 @@ pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
         outside(&TOOL_DEEPEST, &*name, deepest_m / cutter.diameter, &DEEPEST, TOO_SHALLOW, 1.0),
         outside(
             &share,
-            of("the radial over the tangential coefficient"),
+            named("the radial over the tangential coefficient"),
             k.radial / k.tangential,
             &COEFFICIENT,
             &[],
@@ -125,20 +125,20 @@ pub fn tool_caveats(tool: &CuttingTool, deepest_m: f64) -> Vec<Finding> {
         ),
         outside(
             &share,
-            of("the axial over the tangential coefficient"),
+            named("the axial over the tangential coefficient"),
             k.axial.abs() / k.tangential,
             &COEFFICIENT,
             &[],
             1.0,
         ),
-        outside(&angle, of("the lead"), cutter.lead.to_degrees(), &CUTTING_ANGLE, radians, 1.0),
-        outside(&UNUSUAL.with_unit("m"), of("the tip"), tool.tip.norm(), &TIP, slip::LENGTH, 1.0),
+        outside(&angle, named("the lead"), cutter.lead.to_degrees(), &CUTTING_ANGLE, radians, 1.0),
+        outside(&UNUSUAL.with_unit("m"), named("the tip"), tool.tip.norm(), &TIP, slip::LENGTH, 1.0),
     ]
     .into_iter()
     .flatten()
     .collect();
     if cutter.helix != 0.0 {
-        found.extend(outside(&angle, of("the helix"), cutter.helix.to_degrees(), &CUTTING_ANGLE, radians, 1.0));
+        found.extend(outside(&angle, named("the helix"), cutter.helix.to_degrees(), &CUTTING_ANGLE, radians, 1.0));
     }
     // Each mode.
     let masses = MIN_MASS * STEEL * cutter.diameter.powi(3)..=MAX_MASS;

@@ -1,6 +1,8 @@
 //! Output files of `flexarm lobes`: table, diagram, page, figures.
 //!
 //! Start at [`save`]. Depths are shown rounded down, so that a printed limit is stable.
+//!
+//! Not here: the limits, and texts of the terminal.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -79,12 +81,12 @@ fn plot(answer: &Lobes, tool: &CuttingTool) -> Result<String, PlotError> {
     let logarithmic = finite().fold(0.0, f64::max) > WIDE * finite().fold(f64::INFINITY, f64::min);
     // Chatter frequencies by kind.
     let chatter = |kind: &str, name: &str| {
-        let of: Vec<&LobePoint> = answer.points.iter().filter(|p| p.kind == Some(kind)).collect();
+        let points: Vec<&LobePoint> = answer.points.iter().filter(|p| p.kind == Some(kind)).collect();
         PlotCurve {
             name: name.to_owned(),
             look: CurveLook::Dots,
-            x: of.iter().map(|p| p.spindle_rpm).collect(),
-            y: of.iter().map(|p| p.chatter_hz.unwrap_or(f64::NAN)).collect(),
+            x: points.iter().map(|p| p.spindle_rpm).collect(),
+            y: points.iter().map(|p| p.chatter_hz.unwrap_or(f64::NAN)).collect(),
         }
     };
     let chatter = [chatter("hopf", "chatter"), chatter("flip", "chatter (period doubling)")];

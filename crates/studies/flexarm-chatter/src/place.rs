@@ -107,6 +107,7 @@ impl CutPose {
         }
         let arm = robot.model(modelling)?;
         let (mut places, mut left_out) = (Vec::new(), 0);
+        // The feed has no direction where the tool stands or moves along its axis.
         for TipMotion { t, q, velocity, axis } in tip_motion(robot, tool, motion, n)? {
             let across = velocity.cross(&axis).norm();
             if velocity.norm() < STANDS || across < ALONG_AXIS * velocity.norm() {

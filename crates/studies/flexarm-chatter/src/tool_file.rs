@@ -315,6 +315,7 @@ impl Reader<'_> {
             };
         let (ae, immersion) = (e.ae.as_ref().map(Spanned::span), e.immersion.as_ref().map(Spanned::span));
         let (entry_at, exit_at) = (e.entry.as_ref().map(Spanned::span), e.exit.as_ref().map(Spanned::span));
+        // Read the keys of the kind, and refuse those of the others.
         match kind {
             "up" | "down" => {
                 stray(&[("entry", entry_at), ("exit", exit_at)])?;

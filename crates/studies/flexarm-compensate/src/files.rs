@@ -96,10 +96,12 @@ impl Files {
         request: &CompensateRequest,
     ) -> Result<(), Error> {
         let shown = |path: &PathBuf| path.display().to_string();
+        // Files of the corrected motion.
         let trajectory = answer.trajectory.clone();
         let mut files = motion_texts(&request.motions, &trajectory, 1.0 / SAMPLE_S)?;
         answer.files = request.motions.iter().map(shown).collect();
         answer.recording = self.recording.as_ref().map(shown);
+        // Files of the corrected program.
         if let Some(Corrected { figures, files: texts }) = program {
             let names: Vec<PathBuf> = texts.iter().map(|(file, _)| file.clone()).collect();
             check_free(&names, request.overwrite)?;
@@ -107,11 +109,13 @@ impl Files {
             answer.program = Some(figures);
             files.extend(texts);
         }
+        // Table and page in the folder of results.
         if let Some([csv, html]) = &self.folder {
             (answer.file, answer.page) = (Some(shown(csv)), Some(shown(html)));
             files.extend(motion_texts(std::slice::from_ref(csv), &trajectory, 1.0 / SAMPLE_S)?);
             files.push((html.clone(), page::html(answer).into_bytes()));
         }
+        // Write all of them, then the recording, which needs runs.
         write_all(&files)?;
         if let Some(path) = &self.recording {
             super::recording::record(path, answer, arm, found, request)?;

@@ -146,7 +146,7 @@ impl<'a> Job<'a> {
     /// Returns the changed motion, held at its end for `beyond` more samples.
     fn moved_and_held(&self, change: &DMatrix<f64>, beyond: usize) -> Result<Motion, Error> {
         let (m, h, last) = (self.q.nrows(), self.step_s(), self.times.len() - 1);
-        let of = |k: usize, i: i64| change[(k, i.clamp(0, last as i64) as usize)];
+        let correction = |k: usize, i: i64| change[(k, i.clamp(0, last as i64) as usize)];
         let mut reference = vec![Vec::with_capacity(last + 1); m];
         let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
         let times = self.times_and(beyond);
@@ -160,12 +160,15 @@ impl<'a> Job<'a> {
                 let i = i as i64;
                 // Fourth-order central differences; the change is at rest at both ends.
                 let inner = i > 0 && i < last as i64;
-                let rate = (8.0 * (of(k, i + 1) - of(k, i - 1)) - (of(k, i + 2) - of(k, i - 2))) / (12.0 * h);
-                let acceleration =
-                    (16.0 * (of(k, i + 1) + of(k, i - 1)) - (of(k, i + 2) + of(k, i - 2)) - 30.0 * of(k, i))
-                        / (12.0 * h * h);
+                let rate = (8.0 * (correction(k, i + 1) - correction(k, i - 1))
+                    - (correction(k, i + 2) - correction(k, i - 2)))
+                    / (12.0 * h);
+                let acceleration = (16.0 * (correction(k, i + 1) + correction(k, i - 1))
+                    - (correction(k, i + 2) + correction(k, i - 2))
+                    - 30.0 * correction(k, i))
+                    / (12.0 * h * h);
                 let (rate, acceleration) = if inner { (rate, acceleration) } else { (0.0, 0.0) };
-                knots.position.push(q + of(k, i));
+                knots.position.push(q + correction(k, i));
                 knots.velocity.push(v + rate);
                 knots.acceleration.push([a + acceleration; 2]);
             }
@@ -452,12 +455,12 @@ impl<'a> Job<'a> {
 
 /// Linearises the servos about a pose.
 fn controllers(servo: &Servo, q: &[f64], friction: &[Friction]) -> NodeServo {
-    let of = |value: fn(&ServoAxis) -> f64| DVector::from_iterator(servo.axes.len(), servo.axes.iter().map(value));
+    let gains = |value: fn(&ServoAxis) -> f64| DVector::from_iterator(servo.axes.len(), servo.axes.iter().map(value));
     NodeServo {
         axes: servo.axes.iter().map(|axis| axis.coordinate).collect(),
-        stiffness: of(|axis| axis.velocity_gain * axis.position_gain + axis.integral_gain),
-        damping: of(|axis| axis.velocity_gain),
-        integral: of(|axis| axis.integral_gain * axis.position_gain),
+        stiffness: gains(|axis| axis.velocity_gain * axis.position_gain + axis.integral_gain),
+        damping: gains(|axis| axis.velocity_gain),
+        integral: gains(|axis| axis.integral_gain * axis.position_gain),
         ahead: servo.fed_forward(q, friction),
     }
 }

@@ -4,6 +4,8 @@
 //! The controller assumes a rigid arm. Each literal target is replaced by the one for which the
 //! flexible TCP is at the original target, under the mean of the loads during the rest there. The
 //! written program is read again and checked against the static equilibria.
+//!
+//! Not here: reading and writing of programs (`flexarm-programs`), dynamic errors (`job.rs`).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

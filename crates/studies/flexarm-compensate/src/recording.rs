@@ -80,6 +80,8 @@ impl Against {
     /// it.
     fn changed(&mut self, sample: &Sample) -> Sample {
         let wanted = self.wanted.lock().unwrap_or_else(PoisonError::into_inner);
+        // Desired positions and their central differences; the first frame looks ahead to the first
+        // bend.
         let place = |k: usize| wanted[k.min(wanted.len() - 1)].X_WT.translation.vector;
         let speed = |k: usize| (place(k + 1) - place(k.saturating_sub(1))) / (2.0 * self.interval_s);
         let frame = self.frame.unwrap_or_else(|| {
@@ -90,6 +92,7 @@ impl Against {
         });
         let frame = frame.next(&speed(self.at));
         self.frame = Some(frame);
+        // Error in the world, and along tangent, normal and binormal.
         let rigid = wanted[self.at.min(wanted.len() - 1)].clone();
         let [x, y, z, rx, ry, rz] = tcp_error(&rigid.X_WT, &sample.flexible.X_WT);
         let [along, normal, binormal] = frame.components(&Vector3::new(x, y, z));

@@ -120,11 +120,13 @@ pub(super) fn shaped(arm: &Arc<Arm>, scenario: &Scenario, shaping: Shaping) -> R
 fn through(shaper: &Shaper, motion: &Trajectory) -> Result<Trajectory, Error> {
     let m = motion.joints().len();
     let (mut q, mut v, mut a) = (vec![0.0; m], vec![0.0; m], vec![0.0; m]);
+    // Instants from the start to the end of the last copy.
     let total = motion.duration() + shaper.delay_s();
     let n = (total / SAMPLE_S).ceil() as usize;
     let times: Vec<f64> = (0..=n).map(|k| total * k as f64 / n as f64).collect();
     let mut joints: Vec<JointKnots> =
         motion.joints().iter().map(|name| JointKnots { name: name.clone(), ..JointKnots::default() }).collect();
+    // Weighted sum of the delayed motions at each instant.
     for t in &times {
         let mut sum = vec![[0.0; 3]; m];
         for (delay, part) in &shaper.copies {
@@ -193,13 +195,13 @@ impl AtEnd {
     /// Returns the modes that the motion excites, up to a frequency (the first mode in any case),
     /// in order of decreasing vibration.
     fn vibrations(&self, band: f64, up_to_hz: f64) -> Vec<ShapedMode> {
-        let of = |mode: &DampedMode| {
+        let shaped_mode = |mode: &DampedMode| {
             let at = |part: &f64| vibration_left(&self.node, mode, &self.accelerations, self.step_s, 1.0 + band * part);
             let vibration = IN_BAND.iter().map(at).fold(f64::MIN_POSITIVE, f64::max);
             ShapedMode { hz: mode.frequency_hz(), ratio: mode.damping_ratio(), vibration }
         };
         let near = self.modes.iter().enumerate().filter(|(k, mode)| *k == 0 || mode.frequency_hz() <= up_to_hz);
-        let mut all: Vec<ShapedMode> = near.map(|(_, mode)| of(mode)).collect();
+        let mut all: Vec<ShapedMode> = near.map(|(_, mode)| shaped_mode(mode)).collect();
         all.sort_by(|a, b| b.vibration.total_cmp(&a.vibration));
         let most = all.first().map_or(0.0, |mode| mode.vibration);
         all.retain(|mode| mode.vibration >= SMALL * most);

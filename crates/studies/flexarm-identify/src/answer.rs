@@ -224,11 +224,11 @@ fn responses(measurements: &Measurements, compared: &[Compared]) -> Vec<Response
         first += own.len();
         let ReadingKind::Response(response) = &reading.kind else { continue };
         let magnitude = |value: fn(&Compared) -> f64| -> Vec<f64> {
-            let of = |pair: &[Compared]| match response.form {
+            let modulus = |pair: &[Compared]| match response.form {
                 Form::Logarithmic => value(&pair[0]).exp(),
                 Form::Complex => value(&pair[0]).hypot(value(&pair[1])),
             };
-            own.chunks_exact(2).map(of).collect()
+            own.chunks_exact(2).map(modulus).collect()
         };
         all.push(ResponseCurves {
             name: reading.name.clone(),
@@ -320,12 +320,12 @@ fn residuals(found: &Identified, compared: &[Compared]) -> (Residual, Option<Hel
     let all = |residuals: &[f64]| rms(residuals.iter().enumerate().map(|(k, r)| in_unit(*r, k)));
     let held_out = found.held_out.as_ref().map(|held| {
         let predicted: Vec<usize> = (0..held.residuals.len()).filter(|k| held.residuals[*k].is_finite()).collect();
-        let of = |values: &[f64]| rms(predicted.iter().map(|k| in_unit(values[*k], *k)));
+        let rms_of = |values: &[f64]| rms(predicted.iter().map(|k| in_unit(values[*k], *k)));
         HeldOutFigures {
             folds: held.folds,
             skipped: held.skipped,
-            rms: of(&held.residuals),
-            rms_before: of(&found.before),
+            rms: rms_of(&held.residuals),
+            rms_before: rms_of(&found.before),
             unit,
         }
     });
@@ -397,8 +397,8 @@ fn shapes(
     unknowns: &DVector<f64>,
 ) -> Result<Vec<ShapeFigures>, Error> {
     let arm = MeasuredArm { nominal, parameters: fitted, measurements };
-    let of = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(IdentifyError::from);
-    let (before, after) = (of(&DVector::zeros(unknowns.len()))?, of(unknowns)?);
+    let assurances = |unknowns: &DVector<f64>| arm.assurances(unknowns).map_err(IdentifyError::from);
+    let (before, after) = (assurances(&DVector::zeros(unknowns.len()))?, assurances(unknowns)?);
     let figures = before.iter().zip(after).map(|((_, _, before), (number, mode, assurance))| ShapeFigures {
         reading: measurements.readings[number].name.clone(),
         mode: mode + 1,

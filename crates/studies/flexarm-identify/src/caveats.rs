@@ -46,7 +46,7 @@ const FRAME_RATIO: f64 = 0.05;
 /// Returns the caveats that the fit itself gives reason for.
 pub(super) fn caveats(found: &Identified) -> Vec<Finding> {
     let mut caveats = Vec::new();
-    // The scatter differs from what the readings' deviations say.
+    // The scatter differs from that of the given standard deviations.
     if let Some(factor) = found.misfit {
         let (cause, remedy) = match factor > 1.0 {
             true => (

@@ -80,12 +80,14 @@ fn check_patterns(all: &[Candidate], input: &MeasurementInput, fit: &[String]) -
 
 /// Sets the prior deviations of the parameters to the uncertainties of the file.
 fn set_priors(chosen: &mut [Candidate], input: &MeasurementInput, all: &[Candidate]) -> Result<(), Error> {
+    // One uncertainty for all factors.
     for candidate in chosen.iter_mut() {
         let logarithmic = candidate.parameter.is_logarithmic();
         if let Some(factor) = input.uncertainty.filter(|_| logarithmic) {
             candidate.parameter.prior = Some(factor.ln());
         }
     }
+    // Uncertainties by name take precedence.
     for (pattern, uncertainty, place) in &input.known {
         let mut matching = chosen.iter_mut().filter(|c| parameters::fits(pattern, &c.parameter.name)).peekable();
         if matching.peek().is_none() {

@@ -117,7 +117,7 @@ pub(super) fn encoder_figures(
     let filed: Vec<Option<f64>> = joints.iter().map(filed).collect();
     let runs = input.recordings.iter().map(|recording| Smooth::of(recording, &model, &filed));
     let runs = runs.collect::<Result<Vec<_>, Error>>()?;
-    // Each gear by itself, coupled gears together.
+    // One fit per gear; coupled gears are fitted together.
     let single = joints.iter().filter(|joint| !is_coupled(joint)).map(|joint| {
         let C = DMatrix::from_element(1, 1, 1.0);
         Gears::of(&runs, &joints, (std::slice::from_ref(joint), C), chosen, &all)
@@ -211,8 +211,9 @@ impl<'a> Gears<'a> {
     /// over time.
     fn per_compliance(&self, run: &Smooth<'_>, torque: &[Vec<f64>], i: usize, motor: usize) -> Vec<f64> {
         let C = &self.C;
-        let of = |s: usize| self.places.iter().enumerate().map(|(j, k)| C[(j, motor)] * torque[*k][s]).sum::<f64>();
-        run.kept.clone().map(|s| C[(i, motor)] * of(s)).collect()
+        let motor_torque =
+            |s: usize| self.places.iter().enumerate().map(|(j, k)| C[(j, motor)] * torque[*k][s]).sum::<f64>();
+        run.kept.clone().map(|s| C[(i, motor)] * motor_torque(s)).collect()
     }
 
     /// Returns the deflection of a joint that the springs to be identified cause. Springs that are

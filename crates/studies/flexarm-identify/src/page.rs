@@ -45,9 +45,9 @@ pub(super) fn html(answer: &Identification) -> String {
     for c in &answer.compared {
         if !drawn.contains(&(c.kind, c.unit)) {
             drawn.push((c.kind, c.unit));
-            let of: Vec<&Compared> =
+            let alike: Vec<&Compared> =
                 answer.compared.iter().filter(|other| (other.kind, other.unit) == (c.kind, c.unit)).collect();
-            page += &residuals(c.kind, c.unit, &of);
+            page += &residuals(c.kind, c.unit, &alike);
         }
     }
     answer.responses.iter().for_each(|response| page += &response_plot(response));

@@ -65,15 +65,15 @@ pub(crate) struct Candidate {
 /// Returns all parameters of an arm, in the order of drives, links, tool and payload.
 pub(crate) fn candidates(robot: &Robot, arm: &Arm) -> Vec<Candidate> {
     // Springs of a drive or a link, by number.
-    let of = |owner: Owner| -> Vec<usize> {
+    let springs_of = |owner: Owner| -> Vec<usize> {
         arm.owners.iter().enumerate().filter(|(_, o)| **o == owner).map(|(k, _)| k).collect()
     };
     let mut found = Vec::new();
     for (number, drive) in robot.drives.iter().enumerate() {
-        found.extend(drive_parameters(drive, of(Owner::Drive(number)), arm));
+        found.extend(drive_parameters(drive, springs_of(Owner::Drive(number)), arm));
     }
     for (number, span) in arm.spans.iter().enumerate() {
-        let springs = of(Owner::Link(number));
+        let springs = springs_of(Owner::Link(number));
         if robot.stands_on(&span.link) {
             found.extend(mounting_parameters(robot, &springs));
         } else if let Some(link) = robot.flexible_links.iter().find(|link| link.flexible.link == span.link) {
@@ -171,6 +171,7 @@ fn link_parameters(link: &RobotLink, springs: &[usize], arm: &Arm) -> Vec<Candid
     let written = ParameterLocation::Link { link: name.clone() };
     let mut found =
         vec![stiffness(format!("link.{name}.stiffness_factor"), "1", link.stiffness_factor, places, written)];
+    // Factors per direction and entries of the matrix need six-DoF springs, not modes.
     let groups = arm.model.elastic();
     if springs.iter().all(|spring| groups[*spring].size == 6 && !groups[*spring].modal) {
         found.extend(link_directions(name, &link.stiffness_factors, springs));
@@ -235,10 +236,10 @@ const ZERO_SIZE: f64 = 1e-2;
 /// the order of roll, pitch and yaw as matrices multiply.
 fn frame_parameters(arm: &Arm) -> Vec<Candidate> {
     let mut found = Vec::new();
-    let rigid = arm.rigid.bodies().iter().map(|body| body.joint.as_str());
-    let of_robot: Vec<&str> = rigid.collect();
+    // Joints of the robot file; those of springs and parts of links have no parameters of their own.
+    let robot_joints: Vec<&str> = arm.rigid.bodies().iter().map(|body| body.joint.as_str()).collect();
     let bodies = arm.model.bodies().iter().enumerate().skip(1);
-    for (body, own) in bodies.filter(|(_, own)| of_robot.contains(&own.joint.as_str())) {
+    for (body, own) in bodies.filter(|(_, own)| robot_joints.contains(&own.joint.as_str())) {
         let JointMotion::Axis(motion) = own.motion else { continue };
         // The frame of a joint with a seat is that of the seat.
         let seat = SEAT.map(|suffix| format!("{}__spring{suffix}", own.joint));

@@ -146,8 +146,8 @@ impl PlanRequest {
         for at in or_tcp(&self.levers) {
             for point in or_tcp(&self.points) {
                 for direction in &directions {
-                    let of = |force: &[f64; 3]| Setup { force: *force, at, point, direction: *direction };
-                    all.extend(self.forces.iter().map(of));
+                    let setup = |force: &[f64; 3]| Setup { force: *force, at, point, direction: *direction };
+                    all.extend(self.forces.iter().map(setup));
                 }
             }
         }
@@ -420,9 +420,10 @@ fn to_fill_in(answer: &MeasurementPlan, request: &PlanRequest, slides: &[bool]) 
     let read = if gauges { ",ux,uy,uz,d" } else { ",dx,dy,dz" };
     let joints: Vec<String> = answer.joints.iter().map(|joint| csv_field(joint)).collect();
     let mut out = format!("{},fx,fy,fz{lever}{point}{read}\n", joints.join(","));
+    // Joints in degrees or mm, forces in N, lengths in mm; the readings stay empty.
     for pose in &answer.poses {
-        let of = |(q, slides): (&f64, &bool)| format!("{:.4}", if *slides { 1e3 * q } else { q.to_degrees() });
-        let joints: Vec<String> = pose.joints.iter().zip(slides).map(of).collect();
+        let joint_text = |(q, slides): (&f64, &bool)| format!("{:.4}", if *slides { 1e3 * q } else { q.to_degrees() });
+        let joints: Vec<String> = pose.joints.iter().zip(slides).map(joint_text).collect();
         let three = |[x, y, z]: [f64; 3]| format!(",{x},{y},{z}");
         out += &format!("{}{}", joints.join(","), three(pose.force));
         if levers {

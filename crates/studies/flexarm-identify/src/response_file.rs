@@ -221,7 +221,7 @@ impl Reader<'_> {
             values.push((f, value * factor, std));
         }
         // A table names one pair of points.
-        let of = |node: &Option<Spanned<String>>, direction: &Option<Spanned<Direction>>, what: &str| {
+        let probe_of = |node: &Option<Spanned<String>>, direction: &Option<Spanned<Direction>>, what: &str| {
             let Some(direction) = direction else {
                 return Err(self.error(&e.file, format!("a table needs a direction, such as {what}_direction = \"x\"")));
             };
@@ -230,8 +230,8 @@ impl Reader<'_> {
         };
         Ok(Curve {
             name: e.file.get_ref().display().to_string(),
-            watched: of(&e.watched, &e.watched_direction, "watched")?,
-            hit: of(&e.hit, &e.hit_direction, "hit")?,
+            watched: probe_of(&e.watched, &e.watched_direction, "watched")?,
+            hit: probe_of(&e.hit, &e.hit_direction, "hit")?,
             answer,
             values,
         })
@@ -303,6 +303,7 @@ impl Reader<'_> {
             let text = format!("{a} nodes, {b} directions, {c} amplitudes: expected equal numbers of at least two");
             return Err(self.error(site, text));
         }
+        // The scale of the amplitudes is arbitrary, so only their direction counts.
         let amplitudes = DVector::from_column_slice(amplitudes);
         if !(amplitudes.norm().is_finite() && amplitudes.norm() > 0.0) {
             return Err(self.error(&e.amplitudes, "amplitudes: expected finite numbers that are not all zero"));

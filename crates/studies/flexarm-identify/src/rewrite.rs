@@ -2,6 +2,8 @@
 //!
 //! Start at `rewritten`. Each value goes to its `ParameterLocation`; poses are composed of several
 //! values (`put_tool`, `put_frames`). Frames: L link of the tool, T tool.
+//!
+//! Not here: the choice of what is fitted (`choose.rs`), robots made of the new text.
 
 use std::path::Path;
 
@@ -276,8 +278,10 @@ fn put_tool(file: &mut DocumentMut, found: &[(FittedParameter, ParameterLocation
     if shift == [0.0; 6] {
         return Some(());
     }
+    // X_LT moved and turned about the axes of T.
     let part = |first: usize| Vector3::new(shift[first], shift[first + 1], shift[first + 2]);
     let X_LT = tool.1 * Pose::from_parts(Translation3::from(part(0)), Rotation3::new(part(3)));
+    // A file without a tool gets one, on the link of the robot's tool.
     if file.get("tcp").is_none() {
         let link = [("link", Value::from(tool.0))].into_iter().collect::<InlineTable>();
         file.insert("tcp", toml_edit::value(link));

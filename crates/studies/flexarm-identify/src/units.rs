@@ -33,7 +33,7 @@ pub(super) fn check_modes(nominal: &NominalArm, input: &MeasurementInput) -> Res
 /// Compares displacements and distances with those of the nominal robot; a large ratio indicates
 /// wrong units.
 pub(super) fn check_units(nominal: &NominalArm, input: &MeasurementInput) -> Result<(), Error> {
-    let of = |which: fn(&Reading) -> bool| input.measurements.in_world(|k| which(&input.measurements.readings[k]));
+    let subset = |which: fn(&Reading) -> bool| input.measurements.in_world(|k| which(&input.measurements.readings[k]));
     // An arm without equilibrium is not judged here.
     let both = |some: &Measurements| {
         let arm = MeasuredArm { nominal, parameters: &[], measurements: some };
@@ -41,17 +41,17 @@ pub(super) fn check_units(nominal: &NominalArm, input: &MeasurementInput) -> Res
         (arm.observed(), expected)
     };
     let norm = |values: &[f64]| values.iter().map(|x| x * x).sum::<f64>().sqrt();
-    let moved = of(|reading| matches!(reading.kind, ReadingKind::Displacement { .. }));
+    let moved = subset(|reading| matches!(reading.kind, ReadingKind::Displacement { .. }));
     let (measured, expected) = both(&moved);
     check_ratio("displacements", norm(&measured), norm(&expected), input)?;
-    let (measured, expected) = both(&of(|reading| reading.position().is_some()));
+    let (measured, expected) = both(&subset(|reading| reading.position().is_some()));
     let spread = |values: &[f64]| {
         let points: Vec<Vector3<f64>> = values.chunks_exact(3).map(Vector3::from_column_slice).collect();
         let middle = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
         points.iter().map(|p| (p - middle).norm_squared()).sum::<f64>().sqrt()
     };
     check_ratio("distances between places", spread(&measured), spread(&expected), input)?;
-    let (measured, expected) = both(&of(|reading| matches!(reading.kind, ReadingKind::Frequencies { .. })));
+    let (measured, expected) = both(&subset(|reading| matches!(reading.kind, ReadingKind::Frequencies { .. })));
     check_frequencies(&measured, &expected)?;
     for reading in &input.measurements.readings {
         let ReadingKind::Response(response) = &reading.kind else { continue };

@@ -2,6 +2,8 @@
 //!
 //! Start at [`Layout::new`]: rows are written in the same order by [`super::evaluate`]. Names end
 //! in the unit.
+//!
+//! Not here: values of the poses (`evaluate.rs`), files (`files.rs`).
 
 use flexarm_stepping::Plant;
 
@@ -71,6 +73,8 @@ pub(super) const HEAD: [(&str, &str); 6] = [
 pub(super) const PLACE: usize = 3;
 
 impl Layout {
+    /// Lists the columns of a map.
+    ///
     /// * `joints`: names, and whether they are prismatic.
     /// * `loaded`: whether a wrench acts in addition to gravity.
     /// * `tool`: a cutting tool.

@@ -131,6 +131,7 @@ fn push_row(
     rows.extend(found.rigid_tcp_pose.translation.vector.iter());
     rows.extend([label.place as f64, label.direction as f64, label.branch as f64]);
     rows.extend(q);
+    // Sag under gravity, then the displacement and its change due to the load.
     let sag = &weighed.sag;
     push_displacement(sag, rows);
     let mut moved = *sag;

@@ -1,5 +1,8 @@
 //! A map as a recording for the Rerun viewer: coloured places, slices, iso-surfaces, compliance
 //! ellipsoids, and the arm at the worst and at the best pose.
+//!
+//! All poses in the world; colours from the worst to the best value of the metric. Not here: the
+//! map as a table (`table.rs`) or a page (`page.rs`).
 
 use std::path::Path;
 

@@ -2,6 +2,8 @@
 //!
 //! Start at [`take`]. A thread takes a chunk of places, collects the poses of whole places, and
 //! evaluates them together; the rows are joined in the order of the places.
+//!
+//! Not here: the row of a pose (`evaluate.rs`), inverse kinematics of a place (`finder.rs`).
 
 use std::ops::ControlFlow;
 use std::sync::Mutex;
@@ -193,6 +195,7 @@ impl<'a> Worker<'a> {
                     self.labels.push(PoseLabel { place, direction: 0, branch: 0 });
                 }
             }
+            // Poses are answered in batches, so that memory stays bounded.
             if self.labels.len() >= MAX_WAITING {
                 self.answer(&mut taken, go_on);
             }

@@ -279,7 +279,7 @@ fn joints(
     floor: f64,
     reducers: Option<Reducer>,
 ) -> Vec<DraftJoint> {
-    let of = |&place: &usize| {
+    let draft_joint = |&place: &usize| {
         let joint = &mechanism.joints[place];
         let k = model.coordinates().iter().position(|c| c.joint == joint.name)?;
         let (speed, speed_assumed) = sample::speed_of(joint);
@@ -289,7 +289,7 @@ fn joints(
         let joint = joint.clone();
         Some(DraftJoint { joint, speed, speed_assumed, effort_fault, weight, needed, rated: 0.0, gear: None })
     };
-    let mut joints: Vec<DraftJoint> = chain.joints.iter().filter_map(of).collect();
+    let mut joints: Vec<DraftJoint> = chain.joints.iter().filter_map(draft_joint).collect();
     // An effort limit equal for all joints and wrong for some is a placeholder.
     let same = |j: &DraftJoint| j.joint.limits.effort == joints[0].joint.limits.effort;
     let weak = |j: &DraftJoint| j.joint.limits.effort < j.weight;

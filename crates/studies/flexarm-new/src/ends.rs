@@ -51,6 +51,8 @@ enum AxisPosition {
 }
 
 impl AxisPosition {
+    /// Position of a joint axis along a body.
+    ///
     /// * `point`: a point on the joint axis, relative to the middle of the body.
     fn of(point: Vector3<f64>, axis: Option<Vector3<f64>>, along: &Vector3<f64>) -> Self {
         let s = point.dot(along);

@@ -87,6 +87,7 @@ pub fn class(reducer: Reducer, rated: f64) -> GearClass {
         );
         return GearClass { stiffness, low, high, source, is_beyond };
     }
+    // Strain wave: geometric mean of the stiffness at small and at large torque.
     let rows = |which: fn(&(f64, f64, f64, f64)) -> f64| -> Vec<_> {
         STRAIN_WAVE.iter().map(|row| (row.0, row.1, which(row))).collect()
     };

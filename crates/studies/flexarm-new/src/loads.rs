@@ -1,6 +1,8 @@
 //! Loads of the joints: torques from gravity and acceleration, over the whole workspace.
 //!
 //! Start at [`Workspace::of`]. Efforts in N m or N, maxima over the sampled poses.
+//!
+//! Not here: samples of the poses (`sample.rs`), stiffness of gears for these loads (`gears.rs`).
 
 use flexarm_kinematics::{
     Data, Joint, JointKind, Link, LinkInertia, Mechanism, Model, Pose, forward_kinematics, gravity_forces, mass_matrix,
@@ -106,7 +108,9 @@ pub(crate) fn posed(model: &Model, data: &mut Data, q: DVector<f64>) -> Posed {
 }
 
 impl Workspace {
-    /// * `ranges`: range of each coordinate; a held one has equal ends.
+    /// Samples the poses of the workspace.
+    ///
+    /// * `ranges`: range of each coordinate (rad or m); a fixed one has equal ends.
     pub(crate) fn of(model: &Model, ranges: &[[f64; 2]]) -> Self {
         let n = model.nv();
         let moved: Vec<usize> = (0..n).filter(|&k| ranges[k][0] < ranges[k][1]).collect();
@@ -118,6 +122,7 @@ impl Workspace {
         let mut data = Data::new(model);
         let mut workspace =
             Self { moved: moved.clone(), poses: Vec::new(), weight: vec![0.0; n], inertia: vec![0.0; n] };
+        // Maxima of inertia and weight at each joint over the poses of a Halton sequence.
         for pose in 1..=POSES {
             let q = DVector::from_fn(n, |k, _| place(pose, k));
             let M = mass_matrix(model, &mut data, &q);

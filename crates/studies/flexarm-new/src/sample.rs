@@ -167,15 +167,18 @@ fn choose(model: &Model, data: &mut Data, poses: &[Posed], axes: &[Axis], wish: 
             |axis: &Axis| (pose.q[axis.k] - 0.5 * (axis.range[0] + axis.range[1])) / (axis.range[1] - axis.range[0]);
         axes.iter().map(|axis| part(axis).powi(2)).sum()
     };
+    // Start at the pose nearest to the middle of the ranges.
     let sound: Vec<&Posed> = poses.iter().filter(|pose| wish.is_met(pose, axes)).collect();
     let Some(&start) = sound.iter().min_by(|a, b| away(a).total_cmp(&away(b))) else { return Vec::new() };
     let mut rests = vec![start.clone()];
     let turns = turns_in_place(poses);
     let apart = |a: &Posed, b: &Posed| if turns { (&a.q - &b.q).norm() } else { (a.tool - b.tool).norm() };
+    // A motion must meet the conditions on its way too, here and back to the start.
     let mut way = |a: &Posed, b: &Posed| {
         (1..8).all(|i| wish.is_met(&posed(model, data, a.q.lerp(&b.q, f64::from(i) / 8.0)), axes))
     };
     while rests.len() <= GOALS {
+        // Farthest pose from all chosen ones that can be reached.
         let distance = |pose: &Posed| rests.iter().map(|r| apart(r, pose)).fold(f64::INFINITY, f64::min);
         let mut order: Vec<(&Posed, f64)> =
             sound.iter().map(|p| (*p, distance(p))).filter(|(_, d)| *d > SAME_PLACE).collect();

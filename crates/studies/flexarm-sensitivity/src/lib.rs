@@ -163,14 +163,17 @@ fn slopes_and_caveats(
         let text = format!("derivatives of a run need the stepper generalised-alpha, found {name}: use the default");
         return Err(Error::Step { source: StepError::Setup(text), partial: false });
     };
+    // The run must be possible, and something in the arm elastic.
     runnable(&scenario.motion, options)?;
     if arm.springs.is_empty() && !arm.has_servo() {
         return Err(Error::nothing_yields());
     }
     flexarm_run::loops::along_motion(&arm.rigid, &scenario.motion.trajectory)?;
+    // The plant with its loads, and caveats about the set-up.
     let unloaded = arm.plant(scenario.motion.prescribed()).map_err(|error| arm.explained(error))?;
     let (ready, mut caveats) = loaded(arm.robot(), scenario, options, unloaded)?;
     caveats.extend(BeforeRun { arm, plant: &ready, motion: &scenario.motion, options }.of_steps());
+    // The nominal run, and its derivatives.
     let run = ExactRun {
         settings,
         step_s: options.step_s,
@@ -246,7 +249,7 @@ pub fn sensitivity(
     }
     // Effects of the reported changes, strongest first.
     let (position, rotation) = (&found.position, &found.rotation);
-    let of = |(k, own): (usize, NamedParameter)| ParameterSensitivity {
+    let parameter_figures = |(k, own): (usize, NamedParameter)| ParameterSensitivity {
         name: own.name,
         unit: own.unit,
         value: own.value,
@@ -256,7 +259,7 @@ pub fn sensitivity(
         peak_rad: rotation.peak_slopes[k] * own.scale,
         rms_rad: rotation.rms_slopes[k] * own.scale,
     };
-    let mut parameters: Vec<ParameterSensitivity> = named.into_iter().enumerate().map(of).collect();
+    let mut parameters: Vec<ParameterSensitivity> = named.into_iter().enumerate().map(parameter_figures).collect();
     parameters.sort_by(|a, b| b.rms_m.abs().total_cmp(&a.rms_m.abs()));
     Ok(Sensitivity {
         robot: robot.name.clone(),

@@ -153,7 +153,7 @@ fn slopes(
     let tool = tool_slopes(&mut point, &all);
     let compliance = compliance_slopes(&mut point, &none, &all).map_err(explained)?;
     let frequencies = frequency_slopes(&nominal(arm), &all, &at).map_err(explained)?;
-    let of = |(k, parameter): (usize, Parameter)| {
+    let pose_parameter = |(k, parameter): (usize, Parameter)| {
         let (per, scale) = change_of(&parameter);
         let moved = |first: usize| std::array::from_fn(|i| scale * tool[(first + i, k)]);
         PoseParameter {
@@ -179,7 +179,7 @@ fn slopes(
         robot: robot.name.clone(),
         compliance: rows(&C, 1.0),
         frequencies_hz: frequencies.hz.clone(),
-        parameters: all.into_iter().enumerate().map(of).chain(of_tools).collect(),
+        parameters: all.into_iter().enumerate().map(pose_parameter).chain(of_tools).collect(),
         warnings: warnings(&caveats),
         caveats,
         joints,

@@ -8,7 +8,7 @@
 //! frequencies, and so the phases of modes: until a mode with damping ratio ζ has died out, by
 //! `x/4ζ` or so, which makes the third derivative `1/16ζ²` of the first. With [`OF_FREQUENCY`] both
 //! errors are below 1e-6 down to ζ = 0.005. Dampers, friction and gains of servos change amplitudes:
-//! their third derivative is about the first, and both are small, so that rounding asks for the
+//! their third derivative is about the first, and both are small, so that rounding requires the
 //! longer step [`OF_AMPLITUDE`].
 //!
 //! Start at [`Repeated::slopes`]. Errors are displacement and rotation vector, world axes. Not here:

@@ -135,6 +135,7 @@ impl Sweep {
             mass_kg: built.mass_kg,
             ..QuickFacts::default()
         };
+        // Caveats about the start, then the run itself.
         let before = BeforeRun { arm, plant: &plant, motion: &scenario.motion, options: &options };
         caveats.extend(before.caveats_of_study(facts.sag_m));
         caveats.extend(of_loads);

@@ -168,12 +168,12 @@ impl Formula {
 
     /// Returns the preferred direction, derived from those of the variables.
     fn better(&self, known: &Vocabulary<'_>) -> Option<Better> {
-        let of = |variable: &Variable| match variable {
+        let better_of = |variable: &Variable| match variable {
             Variable::Parameter(column) => direction::of_name(known.parameters[*column].as_deref()?),
             Variable::Metric(number) => known.metrics[*number].better,
             Variable::Fact(path, _) => direction::of_fact(path),
         };
-        let variables: Vec<Option<Better>> = self.variables.iter().map(of).collect();
+        let variables: Vec<Option<Better>> = self.variables.iter().map(better_of).collect();
         direction::of_expression(&self.expression, &variables)
     }
 
@@ -196,12 +196,12 @@ impl Formula {
     ///
     /// * `before`: values of the earlier metrics.
     pub(super) fn value(&self, parameters: &[ParameterValue], before: &[f64], facts: &dyn Facts) -> f64 {
-        let of = |variable: &Variable| match variable {
+        let value_of = |variable: &Variable| match variable {
             Variable::Parameter(column) => parameters[*column].number().unwrap_or(f64::NAN),
             Variable::Metric(number) => before.get(*number).copied().unwrap_or(f64::NAN),
             Variable::Fact(path, quick) => facts.number(path, *quick),
         };
-        let values: Vec<f64> = self.variables.iter().map(of).collect();
+        let values: Vec<f64> = self.variables.iter().map(value_of).collect();
         let value = self.expression.eval(&values).unwrap_or(f64::NAN);
         // Infinite values would spoil means over a table of runs.
         if value.is_finite() { value } else { f64::NAN }

@@ -306,16 +306,16 @@ impl Sweep {
     }
 
     fn parameter_figures(&self, columns: &Columns) -> Vec<ParameterFigures> {
-        let of = |(k, values): (usize, &Option<Vec<f64>>)| ParameterFigures {
+        let figures = |(k, values): (usize, &Option<Vec<f64>>)| ParameterFigures {
             name: self.design.columns[k].name.clone(),
             range: values.as_ref().and_then(|values| spread(values)).map(|spread| [spread.min, spread.max]),
             role: self.design.columns[k].role,
         };
-        columns.parameters.iter().enumerate().map(of).collect()
+        columns.parameters.iter().enumerate().map(figures).collect()
     }
 
     fn metric_figures(&self, columns: &Columns) -> Vec<MetricFigures> {
-        let of = |(k, values): (usize, &Vec<f64>)| {
+        let figures = |(k, values): (usize, &Vec<f64>)| {
             let spread = spread(values);
             let name = |p: usize| self.design.columns[p].name.clone();
             let share = |p: usize| (name(p), self.effect(p, k, columns).map(|effect| effect.share));
@@ -335,7 +335,7 @@ impl Sweep {
                 sobol: self.indices(values, columns),
             }
         };
-        columns.metrics.iter().enumerate().map(of).collect()
+        columns.metrics.iter().enumerate().map(figures).collect()
     }
 }
 

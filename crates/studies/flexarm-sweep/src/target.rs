@@ -50,6 +50,8 @@ impl Target {
             Some(Segment::Key(key)) => key.as_str(),
             _ => "",
         };
+        // Whole files, then options, then entries of a file; a path without a file is one of the
+        // robot.
         match (word(0), all.len()) {
             ("robot", 1) => Ok(Self::File(TargetFile::Robot)),
             ("motion", 1) => Ok(Self::File(TargetFile::Motion)),

@@ -166,12 +166,14 @@ impl Sides {
         if side.norm() < 1e-6 {
             return sides;
         }
+        // Front: the side of axis 2, or else of the centre, across the first two axes.
         let (foot, shoulder) = feet(&axes[0], &axes[1]);
         let floor = 1e-6 * reach;
         let first = |values: &[f64]| values.iter().copied().find(|v| v.abs() > floor).unwrap_or(1.0).signum();
         let front = side.normalize();
         let center = if let Kernel::Wrist(k) = kernel { k.center - axes[0].o } else { Vector3::zeros() };
         sides.front = front * first(&[front.dot(&(shoulder - foot)), front.dot(&center)]);
+        // Up: along axis 1 from the base to the foot of axis 2, or else against gravity.
         let up = axes[0].h;
         let height = if reversed { 0.0 } else { up.dot(&foot) };
         let up = up * first(&[height, up.dot(&up_W)]);
@@ -196,12 +198,14 @@ impl AnalyticArm {
         }
         let mut values = match &self.kernel {
             Kernel::Wrist(k) => {
+                // Both roots of the position problem, and the wrist beyond φ or not.
                 let [base, elbow] = self.arm_sides(&k.axes, k.form, &k.center, &q);
                 [base, elbow, self.beyond(k.fan.phi, q[4])]
             }
             Kernel::Parallel234(k) => {
                 let [s1, s2, s3, s4, s5, _] = &k.axes;
                 let (t2, t3, t4) = (s2.at(q[1]), s3.at(q[2]), s4.at(q[3]));
+                // Side of axis 1 on which the point of axis 6 lies, bend of the bars, and joint 5.
                 let point = t2.point(&t3.point(&t4.point(&s5.at(q[4]).point(&k.near.1))));
                 let base = s1.h.cross(&s2.h).dot(&(point - s1.o)) / k.reach;
                 [base, bend(s2, &s3.o, &t3.point(&s4.o), &s3.h), self.beyond(k.fan.phi, q[4])]
@@ -209,6 +213,8 @@ impl AnalyticArm {
             Kernel::Parallel123(k) => {
                 let [s1, s2, s3, s4, s5, s6] = &k.axes;
                 let (t4, t5) = (s4.at(q[3]), s5.at(q[4]));
+                // Bend of the bars, and the sides of joints 4 and 5 relative to the common
+                // direction.
                 let lever = t4.vector(&(k.near.1 - s4.o));
                 let fifth = t4.inverse().vector(&s1.h).dot(&s5.h.cross(&t5.vector(&s6.h)));
                 [bend(s1, &s2.o, &s2.at(q[1]).point(&s3.o), &s2.h), -s1.h.dot(&s4.h.cross(&lever)) / k.reach, -fifth]
@@ -259,7 +265,7 @@ impl AnalyticArm {
     }
 
     /// Whether the elbow is up: above the line from axis 2 to the wrist centre, when the wrist
-    /// centre is farther out than axis 2.
+    /// centre is farther out than axis 2. `q`: joint values (rad).
     ///
     /// `None` for arms other than those with a spherical wrist and axes 2 and 3 parallel.
     pub fn elbow_up(&self, q: &[f64; 6]) -> Option<bool> {
@@ -369,7 +375,7 @@ impl AnalyticArm {
     }
 
     /// Calls `visit` with every copy of the joint values, shifted by whole turns, that is within
-    /// the limits; a joint without limits has one copy, in (-π, π].
+    /// the limits; a joint without limits has one copy, in (-π, π]. Joint values in rad.
     pub fn copies_within_limits(&self, q: &[f64; 6], mut visit: impl FnMut(&[f64; 6])) {
         let ranges: [_; 6] = std::array::from_fn(|k| self.turns(k, wrapped(q[k])));
         if ranges.iter().any(|(low, high)| low > high) {

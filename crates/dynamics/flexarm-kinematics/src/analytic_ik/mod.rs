@@ -254,7 +254,7 @@ impl AnalyticArm {
     }
 
     /// Computes all joint values that bring the frame to `X_WT`, regardless of limits; a free joint
-    /// is set to zero.
+    /// is set to zero. `X_WT`: in the world, translation in m; joint values in rad.
     ///
     /// Does not allocate. A pose with NaN or infinite entries has no solution, nor has a pose whose
     /// rotation is not orthogonal to [`POSE_TOLERANCE`].

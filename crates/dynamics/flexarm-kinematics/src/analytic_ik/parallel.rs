@@ -85,6 +85,7 @@ impl Parallel234 {
         let h = s2.h;
         for (group, &(q1, q5, free)) in self.first_and_fifth(G, hint).as_slice().iter().enumerate() {
             let (t1, t5) = (s1.at(q1), s5.at(q5));
+            // Joint 6 turns G_Rᵀ R_1 h onto R_5ᵀ h; the bars must reach its end point.
             let turned = angle_about(&s6.h, &(G.rotation.inverse() * t1.vector(&h)), &t5.inverse().vector(&h));
             let end = |q6: f64| {
                 let end = G * Point3::from(s6.at(q6).inverse().point(&t5.inverse().point(&s4.o)));
@@ -92,6 +93,7 @@ impl Parallel234 {
             };
             let sixth = sixth_angles(turned, hint[5], group, free, |q6| bars_reach(s2, s3, &s4.o, &end(q6)));
             for &(q6, kind) in sixth.as_slice() {
+                // Sum of the angles of the parallel joints, then the angles of the two bars.
                 let n = across(&h);
                 let turned = G.rotation * s6.at(q6).inverse().vector(&t5.inverse().vector(&n));
                 let (total, _) = angle_about(&h, &n, &t1.inverse().vector(&turned));
@@ -104,6 +106,7 @@ impl Parallel234 {
         }
     }
 
+    /// Angles of joints 1 and 5 from (i) and (ii), with whether one of them is free.
     fn first_and_fifth(&self, G: &Pose, hint: &[f64; 6]) -> Pairs {
         let [s1, s2, _, _, s5, s6] = &self.axes;
         let (h, (o5, o6)) = (s2.h, self.near);
@@ -202,6 +205,8 @@ impl Parallel123 {
         }
     }
 
+    /// Angles of joints 4 and 5: the height of the tool point along h, and the component of `h_6`
+    /// along h, are not affected by joints 1 to 3.
     fn fourth_and_fifth(&self, G: &Pose, hint: &[f64; 6]) -> Pairs {
         let [s1, _, _, s4, s5, s6] = &self.axes;
         let (h, (o5, o6)) = (s1.h, self.near);

@@ -3,6 +3,9 @@
 //! If two neighbouring axes intersect or are parallel, one equation contains a single angle and the
 //! others follow in closed form (subproblems of Paden and Kahan, [Elias & Wen 2022]); otherwise the
 //! angle of the third joint is a root of a quartic [Pieper 1968].
+//!
+//! Not here: orientation (`wrist`), polynomials (`trig`), arms with parallel axes 2 to 4
+//! (`parallel`).
 
 use nalgebra::Vector3;
 

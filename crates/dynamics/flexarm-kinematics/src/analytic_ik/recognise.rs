@@ -277,13 +277,13 @@ fn chain_of(model: &Model, frame: &Frame, joints: &[usize; 6], q_fixed: &DVector
 fn dexterity(chain: &Chain) -> f64 {
     let positions =
         [[0.3, -0.7, 1.1, 0.5, -0.9, 0.4], [-1.2, 0.4, -0.6, 1.3, 0.8, -0.2], [2.1, 0.9, 0.5, -1.6, 1.4, 1.0]];
-    let of = |q: &[f64; 6]| {
+    let conditioning = |q: &[f64; 6]| {
         let mut J = chain.jacobian(q);
         J.fixed_rows_mut::<3>(0).scale_mut(1.0 / chain.reach);
         let values = J.singular_values();
         values.min() / values.max()
     };
-    positions.iter().map(of).fold(0.0, f64::max)
+    positions.iter().map(conditioning).fold(0.0, f64::max)
 }
 
 struct RecognisedArm {
@@ -297,12 +297,14 @@ struct RecognisedArm {
 fn recognise(chain: &Chain, frame: &str) -> Result<RecognisedArm, NoAnalyticIk> {
     let from_tool = Lines::new(chain, true);
     let from_base = Lines::new(chain, false);
+    // Three axes that meet at one point, at the tool or at the base.
     for lines in [&from_base, &from_tool] {
         if let Some((kernel, form, deviation)) = lines.wrist() {
             let class = if lines.reversed { ArmClass::SphericalShoulder(form) } else { ArmClass::SphericalWrist(form) };
             return Ok(RecognisedArm { class, kernel, reversed: lines.reversed, deviation });
         }
     }
+    // Three neighbouring parallel axes, joints 2 to 4 first.
     for start in [1, 0] {
         for lines in [&from_base, &from_tool] {
             if let Some((kernel, meeting, deviation)) = lines.three_parallel(start) {
@@ -312,6 +314,7 @@ fn recognise(chain: &Chain, frame: &str) -> Result<RecognisedArm, NoAnalyticIk> 
             }
         }
     }
+    // No class matches: report the distance from each.
     let apart = |lines: &Lines| lines.meeting_point().map_or(f64::INFINITY, |(_, apart)| apart);
     let spread = |i: usize| from_base.angle(i, i + 1).max(from_base.angle(i, i + 2));
     Err(NoAnalyticIk::NoClass {
@@ -376,16 +379,20 @@ impl Lines {
         Some((c, apart)).filter(|_| apart.is_finite())
     }
 
+    /// Axes with a spherical wrist made exact, the form of the position problem, and the largest
+    /// deviation from both (relative to the reach, or rad).
     fn wrist(&self) -> Option<(Kernel, PositionForm, f64)> {
         let (center, apart) = self.meeting_point()?;
         let apart = apart / self.reach;
         if apart > AXIS_TOLERANCE || self.parallel(3, 4).is_some() || self.parallel(4, 5).is_some() {
             return None;
         }
+        // The last three axes meet: move their points to the centre.
         let mut axes = self.axes;
         for axis in &mut axes[3..] {
             axis.o = center;
         }
+        // First form that the other axes match; their small deviation from it is removed.
         let (form, deviation) = if let Some(angle) = self.parallel(1, 2) {
             axes[2].h = axes[1].h * axes[1].h.dot(&axes[2].h).signum();
             (PositionForm::Parallel23, angle)

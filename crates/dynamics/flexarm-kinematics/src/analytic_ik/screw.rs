@@ -3,6 +3,8 @@
 //! ```text
 //! X_WT(q) = E_1(q_1) ... E_6(q_6) X_WT(0),      E_i(q) x = o_i + R(h_i, q) (x - o_i)
 //! ```
+//!
+//! Not here: closed forms, which use these lines (`wrist`, `parallel`).
 
 use flexarm_spatial::{Pose, rotation_vector, sin_cos_all};
 use nalgebra::{Matrix3, Matrix6, Rotation3, Vector3, Vector6};
@@ -139,6 +141,7 @@ impl Chain {
                 break;
             }
             let J = self.jacobian(q);
+            // First step that at least halves the weighted residual.
             let Some((trial, next)) = self
                 .newton_step(&J, &error)
                 .into_iter()

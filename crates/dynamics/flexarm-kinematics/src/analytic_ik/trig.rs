@@ -4,6 +4,8 @@
 //! a cos t + b sin t = c                          two roots, or the angle of minimum residual
 //! c_0 + 2 Re sum_k c_k e^{i k t} = 0             up to 2 n roots, as points on the unit circle
 //! ```
+//!
+//! Not here: what the angles mean for an arm (`position`, `wrist`, `parallel`).
 
 use nalgebra::{Complex, Vector3};
 
@@ -55,7 +57,7 @@ impl Roots {
         Self { angles: [center + half, center - half], n: if half == 0.0 { 1 } else { 2 }, free: false }
     }
 
-    /// The roots.
+    /// The roots (rad).
     pub fn angles(&self) -> &[f64] {
         &self.angles[..self.n]
     }

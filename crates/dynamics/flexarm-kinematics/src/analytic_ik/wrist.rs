@@ -21,6 +21,8 @@ pub(crate) struct Wrist {
 }
 
 impl Wrist {
+    /// `center`: intersection of axes 4 to 6 at zero joint values (m, world); `reach`: size of the
+    /// arm (m).
     pub(crate) fn new(axes: [Screw; 6], center: Vector3<f64>, form: PositionForm, reach: f64) -> Self {
         let fan = CirclePlane::new(&axes[3].h, &axes[4].h, &axes[5].h);
         Self { axes, center, form, fan, reach }
@@ -36,10 +38,12 @@ impl Wrist {
         let p = G.rotation * self.center + G.translation.vector;
         let n = across(&s6.h);
         let (tip, side) = (G.rotation * s6.h, G.rotation * n);
+        // Joints 1 to 3 from the position of c.
         let base = [self.axes[0], self.axes[1], self.axes[2]];
         let places = place(self.form, &base, &self.center, &p, &[hint[0], hint[1], hint[2]], self.reach);
         for (group, three) in places.as_slice().iter().enumerate() {
             let [q1, q2, q3] = three.q;
+            // Q h_6 and Q n, with n across h_6.
             let (t1, t2, t3) = (s1.at(q1).inverse(), s2.at(q2).inverse(), s3.at(q3).inverse());
             let Q = |v: &Vector3<f64>| t3.vector(&t2.vector(&t1.vector(v)));
             let (tip, side) = (Q(&tip), Q(&side));
@@ -50,6 +54,7 @@ impl Wrist {
                     [q1, q2, q3, q4, q5, angle_about(&s6.h, &n, &rest).0]
                 };
                 let (q4, size) = angle_about(&s4.h, &t5.vector(&s6.h), &tip);
+                // Axes 4 and 6 are in line: joint 4 is free, and the hint is one of its values.
                 if size < STRAIGHT {
                     found.add(with_fourth(hint[3]), Kind::Representative { group });
                     found.add(with_fourth(q4), Kind::Member { group });

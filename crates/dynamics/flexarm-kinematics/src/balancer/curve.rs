@@ -43,7 +43,8 @@ pub enum BalancerCurveError {
 }
 
 impl BalancerCurve {
-    /// Builds the curve through points (x, T).
+    /// Builds the curve through points (x, T): length (m) and tension (N), or joint value (rad, m)
+    /// and its force (N m, N).
     ///
     /// # Errors
     /// [`BalancerCurveError`] for fewer than two points, non-finite values, or x values that are

@@ -117,10 +117,12 @@ impl PlacedBalancer {
             BalancerPlace::Joint { parent, body, child, axis, .. } => {
                 let R = X_WB[*body].rotation;
                 let T = self.law.tension(x);
+                // A revolute joint takes a couple; a sliding one a force at the origin of the
+                // child.
                 if axis.angular.norm_squared() > 0.0 {
                     let moment = R * axis.angular * T;
-                    let of = |moment: Vector3<f64>| Wrench::new(Vector3::zeros(), moment);
-                    return [(*parent, of(moment)), (*child, of(-moment))];
+                    let couple = |moment: Vector3<f64>| Wrench::new(Vector3::zeros(), moment);
+                    return [(*parent, couple(moment)), (*child, couple(-moment))];
                 }
                 let (force, p_W) = (R * axis.linear * T, X_WB[*child].translation.vector);
                 [at_origin(*parent, &p_W, force), at_origin(*child, &p_W, -force)]

@@ -118,6 +118,8 @@ fn check_plane(loop_: &PlacedLoop, closure: &LoopClosure, model: &Model, X_C: &[
         if body.elastic {
             continue;
         }
+        // Angle by which the axis is off: sliding axes lie in the plane, revolute ones along its
+        // normal.
         let axis = X_C[i].rotation * motion.axis();
         let (off, expected) = match motion {
             AxisMotion::Prismatic(_) => (axis.dot(&normal).abs().min(1.0).asin(), "slide across it"),

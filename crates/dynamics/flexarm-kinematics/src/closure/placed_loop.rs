@@ -36,7 +36,7 @@ pub struct PlacedLoop {
 }
 
 impl PlacedLoop {
-    /// Pose `X_AP` of the pin in the body that carries it, pin axis along z.
+    /// Pose `X_AP` of the pin in the body that carries it, pin axis along z. Translation in m.
     pub fn pin(&self) -> &Pose {
         &self.X_pin
     }

@@ -2,6 +2,8 @@
 //!
 //! Velocities `v`, `w` of the origins of the bodies are relative to the common body C, in its axes;
 //! rows of J and J̇ are in the plane of the pin A.
+//!
+//! Not here: positions of the loops (`positions.rs`), accelerations and forces (`recursions.rs`).
 
 use flexarm_spatial::Twist;
 use nalgebra::{Matrix2, Vector2, Vector3};

@@ -95,9 +95,11 @@ impl LoopTangent {
         let Some(loops) = &data.loops else { return &[] };
         let (solved, nv) = (&loops.solved, loops.solved.nv);
         solved.rates_of_subtree(model, data, &loops.q, moved, &mut self.qdot, &mut self.rates);
+        // Forces of the tree change with the dependent coordinates too.
         for (k, rate) in (nv - first..).zip(&self.qdot[nv..]) {
             dtree.iter_mut().zip(self.G.column(k).iter()).for_each(|(to, slope)| *to += slope * rate);
         }
+        // dτ = dτ_own + Tᵀ dτ_d + Ṫᵀ τ_d
         let (own, dependent) = dtree.split_at(nv - first);
         dtau.iter_mut().zip(own).for_each(|(to, own)| *to += own);
         let rows = solved.T.chunks_exact(nv).zip(self.rates.Tdot.chunks_exact(nv));

@@ -114,6 +114,7 @@ pub(super) fn check_inertia(link: &str, inertia: &LinkInertia, moves: bool) -> R
     Quantity::MASS.check("mass", inertia.mass).map_err(|what| out_of_range("link", link, what))?;
     Quantity::LENGTH.check_all("centre of mass", &inertia.com).map_err(|what| out_of_range("link", link, what))?;
     Quantity::INERTIA.check_all("inertia", &inertia.inertia_com).map_err(|what| out_of_range("link", link, what))?;
+    // Principal moments may be negative by rounding only.
     let moments = inertia.inertia_com.symmetric_eigenvalues();
     let smallest = moments.min();
     if smallest < -moment_floor(inertia.mass, moments.amax()) {

@@ -173,6 +173,7 @@ impl Model {
     }
 
     /// Sets the pose of the joint frame of a body in its parent body, at zero coordinate.
+    /// Translation in m.
     ///
     /// # Panics
     /// If there is no such body.

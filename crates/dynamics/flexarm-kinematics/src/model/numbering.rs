@@ -3,6 +3,8 @@
 //! The order is that of [`crate::Model`]: actuated joints in tree order or in that of
 //! `coordinate_order`, elastic joints and modal bodies proximal to distal, joints that follow from
 //! closed loops.
+//!
+//! Not here: checks of the mechanism (`check.rs`).
 
 use std::collections::HashMap;
 
@@ -76,10 +78,12 @@ impl Builder<'_> {
         let joints: HashMap<&str, &Joint> = self.children.values().flatten().map(|j| (j.name.as_str(), *j)).collect();
         let places: HashMap<&str, usize> =
             self.mechanism.coordinate_order.iter().map(String::as_str).zip(0..).collect();
+        // Order of the actuated coordinates: as the mechanism lists them, others after those.
         let place = |i: usize| places.get(self.bodies[i].joint.as_str()).copied().unwrap_or(usize::MAX);
         let mut ordered: Vec<usize> = (0..self.bodies.len()).collect();
         ordered.sort_by_key(|i| place(*i));
         let as_they_are = (0..self.bodies.len()).collect();
+        // Actuated coordinates first, then elastic and modal ones in the order of the tree.
         for (elastic_pass, order) in [(false, ordered), (true, as_they_are)] {
             for i in order {
                 let body = &self.bodies[i];

@@ -3,6 +3,8 @@
 //! For numbers or SIMD lanes of numbers. Sums are in the order of the same operations in nalgebra,
 //! which single runs use, so that each lane is bitwise the same. [`Factor`] has its own order, used
 //! for single poses and lanes alike.
+//!
+//! Not here: sparse or large matrices; eigenvectors, which nalgebra computes.
 
 use flexarm_kinematics::Real;
 

@@ -22,7 +22,7 @@ impl GearCoupling {
         C_inverse.transpose() * DMatrix::from_diagonal(&DVector::from_column_slice(values)) * C_inverse
     }
 
-    /// Returns the motor torques after the gears, `Cᵀ τ`, from joint torques `tau` over all
+    /// Returns the motor torques after the gears, `Cᵀ τ` (N m), from joint torques `tau` over all
     /// coordinates.
     pub fn motor_torques(&self, tau: &[f64]) -> Vec<f64> {
         let joints = DVector::from_iterator(self.coordinates.len(), self.coordinates.iter().map(|k| tau[*k]));

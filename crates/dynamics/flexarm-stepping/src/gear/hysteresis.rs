@@ -25,7 +25,7 @@ pub struct Hysteresis {
 
 impl Hysteresis {
     /// Creates sliders that slip one after the other at evenly spaced deflections up to `reach`,
-    /// with the total torque `friction`.
+    /// with the total torque `friction` (N m over rad, or N over m).
     ///
     /// The first loading curve is a polygon with its corners on the parabola `friction (2 x - x²)`,
     /// `x = δ / reach`, of Rayleigh's law. All arguments are positive.

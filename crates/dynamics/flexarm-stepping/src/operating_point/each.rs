@@ -87,6 +87,7 @@ impl OperatingPoint {
         }
     }
 
+    /// Solves one pose on its own, and copies the requested outputs.
     #[inline(never)]
     fn alone<'a>(
         &mut self,

@@ -4,6 +4,8 @@
 //! The standard path is Newton's iteration with the factor of the springs at rest, up to
 //! convergence. A lane that leaves it (weight or loads that change the stiffness much, steps that
 //! are too large, no equilibrium) is reported and solved individually.
+//!
+//! Not here: lanes that are solved individually (`each.rs`).
 
 use std::sync::Arc;
 
@@ -169,6 +171,7 @@ impl<T: Real> LanePoints<T> {
         data.clear_external_wrenches();
         add_wrench(data, tool, F_T_W);
         gravity_forces_at_poses(model, data);
+        // r = K e, then + p; the scale is the largest force before both cancel.
         let joints = q.len() - r.len();
         let (e, p) = (&q[joints..], &data.tau.as_slice()[joints..]);
         r.fill(T::zero());
@@ -190,6 +193,7 @@ impl<T: Real> LanePoints<T> {
     /// Computes the requested outputs of all lanes, one answer each.
     #[inline(always)]
     pub(super) fn answer(&mut self, asked: PoseOutputs, answers: &mut [PoseAnswer]) {
+        // Compliance and frequencies of all lanes at once.
         let joints = self.q.len() - self.r.len();
         let zeros = [[T::zero(); 6]; 6];
         let C = if asked.compliance { self.tangent.compliance(&self.J[6 * joints..]) } else { zeros };
@@ -198,6 +202,7 @@ impl<T: Real> LanePoints<T> {
             mass_matrix_at_poses(&self.model, &mut self.data);
             whole = self.tangent.find_frequencies(self.data.M.as_slice());
         }
+        // Copy each lane into its answer.
         for (lane, answer) in answers.iter_mut().enumerate() {
             answer.tcp_pose = pose_of(&self.X_WT, lane);
             answer.rigid_tcp_pose = pose_of(&self.X_WT_rigid, lane);

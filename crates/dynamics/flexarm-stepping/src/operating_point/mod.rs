@@ -83,6 +83,7 @@ impl OperatingPoint {
     pub fn new(plant: Plant, tool: Frame) -> Self {
         let (n, nv) = (plant.model.n_elastic(), plant.model.nv());
         let K = plant.stiffness();
+        // Factor of the springs; there is none if their stiffness is not positive definite.
         let mut rest = Factor::new(n);
         let stiff = n > 0 && rest.compute(K.as_slice()) == 1.0;
         Self {
@@ -290,7 +291,7 @@ impl OperatingPoint {
         &self.plant
     }
 
-    /// Returns the pose of the tool in the world at the equilibrium.
+    /// Returns `X_WT`, the pose of the tool in the world at the equilibrium.
     pub fn tcp_pose(&self) -> Pose {
         self.X_WT
     }
@@ -300,7 +301,7 @@ impl OperatingPoint {
         self.X_WT_rigid
     }
 
-    /// Returns all coordinates at the equilibrium: joints, then elastic ones.
+    /// Returns all coordinates at the equilibrium: joints, then elastic ones (rad or m).
     pub fn coordinates(&self) -> &DVector<f64> {
         &self.q
     }
@@ -328,7 +329,7 @@ impl OperatingPoint {
     }
 
     /// Adds the static forces on the elastic coordinates due to the weight of an additional inertia
-    /// on a body (`M_BBo_B`) to `p` (n).
+    /// on a body (`M_BBo_B`) to `p` (n; N, N m).
     ///
     /// # Panics
     /// If `p` is not n long, or there is no such body.

@@ -1,5 +1,7 @@
 //! Compliance and natural frequencies from the tangent at an equilibrium, for one pose or for
 //! several in lanes, with the same operations in the same order.
+//!
+//! Not here: the equilibrium itself (`super`), frequencies with drives that move (`linear.rs`).
 
 use flexarm_kinematics::Real;
 use nalgebra::DMatrix;

@@ -70,6 +70,7 @@ impl ReducedArm {
     /// Applies the events at `t`; free velocities may jump.
     pub(crate) fn at_time(&mut self, t: f64, x: &DVector<f64>, v: &mut DVector<f64>) -> Result<Change, StepError> {
         let mut what = Change::Nothing;
+        // Exchanged payloads: inertia, and the damping that was computed for it.
         while let Some((number, change)) = self.events.due_change(t) {
             let plant = Arc::make_mut(&mut self.plant);
             plant.model = Arc::new(plant.model.with_inertia(change.body, change.inertia));
@@ -80,11 +81,13 @@ impl ReducedArm {
             }
             what = Change::Matrices;
         }
+        // Jumps of the velocity, with impulses.
         if let Some((before, after)) = self.events.pass_jumps(t) {
             (self.sampled_at, self.step_start.time) = (f64::NAN, f64::NAN);
             self.apply_impulses(t, before, after, x, v)?;
             what = what.max(Change::Motion);
         }
+        // Sampling instant of the controllers.
         if let Some(servo) = &mut self.servo
             && self.events.sample_due(t)
         {

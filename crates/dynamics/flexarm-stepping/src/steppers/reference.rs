@@ -28,6 +28,8 @@
 //!
 //! Sources: BDF of variable order [Shampine & Reichelt 1997], ESDIRK3(4) [Jørgensen, Kristensen &
 //! Thomsen 2018], explicit 5(4) pair [Tsitouras 2011].
+//!
+//! Not here: evaluation of ẍ (`reduced`), the steppers of fixed step size.
 
 use std::sync::Arc;
 
@@ -515,6 +517,8 @@ struct FirstOrder<'s, S> {
 }
 
 impl<'s, S: SecondOrderSystem> FirstOrder<'s, S> {
+    /// Prepares evaluations between the times `from` and `to` (s). The increments of the Jacobian are
+    /// relative to the size at which absolute and relative tolerance are equal.
     fn new(system: &'s mut S, from: f64, to: f64, settings: &ReferenceSettings) -> Self {
         let zeros = DVector::zeros(system.dimension());
         let increment = INCREMENT * settings.atol / settings.rtol;

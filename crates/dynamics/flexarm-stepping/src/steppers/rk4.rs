@@ -2,6 +2,8 @@
 //!
 //! Stable while `h ω < 2.78` for every undamped mode; stiffness-proportional damping narrows this
 //! further ([`check_explicit_step`] refuses larger steps). Source: [Hairer, Nørsett & Wanner 1993], section II.1.
+//!
+//! Not here: the modes of the arm, stiff arms (`generalized_alpha`).
 
 use std::sync::Arc;
 

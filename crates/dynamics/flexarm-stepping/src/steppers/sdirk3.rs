@@ -31,6 +31,8 @@
 //! fails is repeated as in generalised-alpha.
 //!
 //! Source: [Alexander 1977]; [Hairer & Wanner 1996], section IV.6.
+//!
+//! Not here: Newton's iteration and its matrix (`implicit.rs`).
 
 use std::sync::Arc;
 

@@ -115,6 +115,7 @@ pub(crate) fn run(terminal: &Terminal, args: &SweepArgs) -> Result<ExitCode, Fai
     }
 }
 
+/// Runs a study, or a shard of it.
 fn sweep(terminal: &Terminal, args: &SweepRunArgs, study: &Path) -> Result<ExitCode, Failure> {
     let mut sweep = Sweep::load(study, &FINDERS)?;
     let request = SweepRequest {
@@ -207,6 +208,7 @@ fn text(found: &SweepSummary) -> String {
     readable(&out) + &again
 }
 
+/// Table of the metrics: range, quantiles, mean.
 fn metric_table(metrics: &[MetricFigures]) -> String {
     let mut t =
         table(&["metric", "runs", "least", "5 %", "median", "95 %", "largest", "mean", "std", "varies most with"]);

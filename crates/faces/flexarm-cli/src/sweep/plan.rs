@@ -151,6 +151,7 @@ impl Plan<'_> {
         (vec![(run, script), (shards, list)], start)
     }
 
+    /// Scripts for Slurm: an array of shards, and the merge after it.
     fn slurm(&self) -> Planned {
         let Self { name, args, folder, .. } = self;
         let (n, cores) = (args.shards, args.cores);

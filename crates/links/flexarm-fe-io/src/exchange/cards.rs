@@ -41,6 +41,7 @@ pub(super) fn cards<'a>(text: Text<'a>, keywords: &[&str]) -> Result<Vec<Card<'a
         if line.is_empty() {
             continue;
         }
+        // A line that begins with a blank, * or + continues the card above.
         let (head, fields, beyond) = fields(line);
         let number = place.line.unwrap_or(0);
         let fields = fields.into_iter().map(|field| (field, number));

@@ -42,6 +42,7 @@ pub fn parse(text: Text<'_>) -> Result<Dmig, FeFileError> {
             "GRID" => parse_grid(&card, &mut result)?,
             "DMIG" => {
                 let name = card.field(0).to_ascii_uppercase();
+                // The first card of a name is the header of the matrix, later ones are columns.
                 match index.get(&name) {
                     None => {
                         check_header(&card, &name)?;

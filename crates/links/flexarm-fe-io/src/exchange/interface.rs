@@ -81,6 +81,7 @@ impl Interface {
     }
 }
 
+/// Parses one term of an interface: a node, some of its components, or rows by number.
 fn parse_pick(name: &str, text: &str) -> Result<RowPick, FeFileError> {
     let text = text.trim();
     let help = "write A=1001 or A=1001:1-6 or A=#1-6; join several with +";
@@ -202,6 +203,7 @@ impl InterfaceMap {
     }
 }
 
+/// Returns the indices of the rows that a term picks.
 fn find_rows(
     pick: RowPick,
     name: &str,
@@ -270,6 +272,7 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
         let interfaces = ('A'..='Z').zip(picks).map(|(name, picks)| Interface { name: name.into(), picks });
         Some(InterfaceMap { interfaces: interfaces.collect(), modal: Vec::new() })
     };
+    // Components of each node, nodes in the order of the rows.
     let mut order: Vec<i64> = Vec::new();
     let mut components: BTreeMap<i64, Vec<u8>> = BTreeMap::new();
     for label in rows.iter().filter(|label| label.dof > 0) {
@@ -280,6 +283,7 @@ pub fn propose_map(rows: &[DofLabel]) -> Option<InterfaceMap> {
         }
         list.push(label.dof);
     }
+    // Does every node have exactly the components 1 to `last`?
     let all = |last: u8| components.values().all(|dofs| dofs.iter().copied().eq(1..=last));
     let node = |i: usize, last: u8| RowPick::Node { node: order[i], first: 1, last };
     match order.len() {

@@ -143,10 +143,12 @@ fn other_matrix(files: &[InputFile]) -> Result<Option<InputFile>, FeFileError> {
                 | MatrixFormat::Csv
         )
     };
+    // A single file of a format that has one matrix per file.
     let format = |file: &InputFile| recognise(&file.bytes).filter(|format| is_matrix(*format));
     let mut matrices = files.iter().filter(|file| format(file).is_some());
     let (Some(only), None) = (matrices.next(), matrices.next()) else { return Ok(None) };
     let Some(role) = only.role.or_else(|| role_by_name(&only.origin)) else { return Ok(None) };
+    // Usual names of the other matrix, in the same folder and format.
     let path = Path::new(&only.origin);
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     for other in other_names(&name, role) {
@@ -235,7 +237,7 @@ fn wanted_by(file: &InputFile) -> Result<Vec<(PathBuf, Option<MatrixRole>)>, FeF
         let plain = folder.join(name);
         if plain.exists() { plain } else { folder.join(format!("{name}.gz")) }
     };
-    // Each format lacks something: labels of rows, the mass, units and interfaces.
+    // Files with what the format lacks: labels of rows, the mass, units and interfaces.
     let mut wanted = Vec::new();
     match recognise(&file.bytes) {
         Some(MatrixFormat::CoordinateText) if ending == "sti" => {
@@ -273,6 +275,7 @@ pub fn parse_matrices(files: &[InputFile], names: &MatrixNames) -> Result<Import
     choose(found, names, origin)
 }
 
+/// Parses a file by its format, and adds what it has to `found`.
 fn parse_file(file: &InputFile, found: &mut CombinedFiles) -> Result<(), FeFileError> {
     let origin = file.origin.as_str();
     let Some(format) = recognise(&file.bytes) else {
@@ -491,6 +494,7 @@ fn aligned(
     if !unique(K) || !unique(M) {
         return Err(refuse());
     }
+    // Rows of the stiffness, then those that only the mass has.
     let in_K: HashSet<&DofLabel> = K.rows.iter().collect();
     let only_M = M.rows.iter().filter(|label| !in_K.contains(label));
     let rows: Vec<DofLabel> = K.rows.iter().chain(only_M).copied().collect();

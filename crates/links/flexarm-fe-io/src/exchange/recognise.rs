@@ -92,6 +92,7 @@ pub fn recognise(bytes: &[u8]) -> Option<MatrixFormat> {
     recognise_text(&String::from_utf8_lossy(&head))
 }
 
+/// Recognises a text format by its marks, then by the shape of its lines.
 fn recognise_text(head: &str) -> Option<MatrixFormat> {
     let lines: Vec<&str> = head.lines().filter(|line| !line.trim().is_empty()).take(20_000).collect();
     let first = lines.first()?.trim_start_matches('\u{feff}');

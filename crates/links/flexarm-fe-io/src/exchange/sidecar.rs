@@ -97,6 +97,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Sidecar, FeFileError> {
     };
     let raw: RawSidecar = toml::from_str(text.text).map_err(syntax)?;
     let refuse = |element: String, found: String, expected: String| text.file().fail(element, found, expected, "");
+    // Format, version and units.
     if raw.format != FORMAT || raw.version != VERSION {
         let found = format!("{:?}, version {}", raw.format, raw.version);
         return Err(refuse("format".into(), found, format!("{FORMAT:?}, version {VERSION}")));
@@ -104,6 +105,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Sidecar, FeFileError> {
     let units = raw.units.parse().map_err(|error: flexarm_fem::FemError| {
         refuse("units".into(), format!("{:?}", raw.units), error.to_string())
     })?;
+    // Interfaces: rows of the matrix, and a frame whose rotation is orthogonal.
     let mut interfaces = Vec::new();
     for entry in raw.interface {
         let R = Matrix3::from_fn(|i, j| entry.rotation[i][j]);

@@ -36,7 +36,7 @@ pub struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// `origin`: name in messages.
+    /// Text with the name `origin` in messages.
     pub fn new(text: &'a str, origin: &'a str) -> Self {
         Self { origin, text }
     }

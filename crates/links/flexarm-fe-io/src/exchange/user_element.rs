@@ -2,6 +2,8 @@
 //!
 //! Node numbers are only in comments (CalculiX, `** ELEMENT NODES`) or in an `*ELEMENT` line.
 //! Matrices are lower triangles row by row; line breaks have no meaning.
+//!
+//! Not here: the choice of the matrices that make a link (`read.rs`).
 
 use nalgebra::DMatrix;
 
@@ -49,6 +51,7 @@ pub(super) fn parse(text: Text<'_>) -> Result<Vec<(MatrixRole, LabelledMatrix)>,
     raw.matrices.iter().map(|matrix| Ok((matrix.role, assemble(matrix, &raw, &rows, text)?))).collect()
 }
 
+/// Collects the lines of the elements and matrices, without interpreting them.
 fn scan(text: Text<'_>) -> Result<Raw<'_>, FeFileError> {
     let mut raw = Raw::default();
     let mut block = Block::Other;
@@ -89,6 +92,7 @@ fn scan(text: Text<'_>) -> Result<Raw<'_>, FeFileError> {
     Ok(raw)
 }
 
+/// Reads a line with a keyword; returns what the data lines below it contain.
 fn scan_keyword<'a>(raw: &mut Raw<'a>, place: &ErrorPosition<'a>, line: &str) -> Result<Block, FeFileError> {
     let upper: String = line.to_ascii_uppercase().replace(' ', "");
     let mut parts = upper.trim().split(',');
@@ -178,6 +182,8 @@ fn labels(raw: &Raw<'_>, text: Text<'_>) -> Result<Vec<DofLabel>, FeFileError> {
     Ok(rows)
 }
 
+/// Assembles a matrix from its values, row by row: the lower triangle, or the whole matrix if it
+/// may be unsymmetric.
 fn assemble(
     raw_matrix: &RawMatrix<'_>,
     raw: &Raw<'_>,

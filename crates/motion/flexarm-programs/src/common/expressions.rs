@@ -177,7 +177,7 @@ impl Parser {
         Ok(left)
     }
 
-    /// Counts the links of a chain, whose tree is as deep as it is long, and limits their number.
+    /// Limits the length of a chain of operators, since its tree has the same depth.
     fn longer(&self, length: usize) -> Result<usize> {
         if length >= LONGEST {
             return fail(

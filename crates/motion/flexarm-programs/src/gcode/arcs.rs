@@ -36,15 +36,18 @@ impl Plane {
 /// Maximum distance of the arcs that replace a helix from it, m.
 const HELIX_ERROR: f64 = 1e-6;
 
-/// Arc of a circle, optionally with a rise along its axis.
+/// Arc of a circle, optionally with a rise along its axis; lengths in m, angles in rad.
 #[derive(Debug, Clone, Copy)]
 struct Helix {
     plane: Plane,
+    /// In the plane.
     centre: [f64; 2],
     radius: f64,
+    /// Angle of the start, from the first axis.
     from: f64,
     /// Positive counterclockwise.
     angle: f64,
+    /// Coordinate of the start along the third axis, and its change over the arc.
     start: f64,
     rise: f64,
 }
@@ -69,6 +72,7 @@ impl Helix {
             return f64::INFINITY;
         };
         let start = at(0.0) - circle.centre;
+        // Distance from the circle: across its plane, and in it.
         let distance = |k: u32| {
             let p = at(f64::from(k) / 16.0) - circle.centre;
             let axis_part = circle.normal().dot(&p);
@@ -162,6 +166,8 @@ impl Gcode<'_> {
         Ok([start[u] + du / 2.0 - dv / chord * side, start[v] + dv / 2.0 + du / chord * side])
     }
 
+    /// Returns the arc from start to goal about the centre, at the radius of the start; a rise
+    /// makes it a helix.
     fn helix(
         &self,
         motion: Motion,
@@ -174,6 +180,7 @@ impl Gcode<'_> {
         let [u, v, w] = self.plane.axes();
         let (a, b) = ([start[u] - centre[0], start[v] - centre[1]], [goal[u] - centre[0], goal[v] - centre[1]]);
         let (radius, end_radius) = (a[0].hypot(a[1]), b[0].hypot(b[1]));
+        // Start and end must be equally far from the centre: 0.5 mm, or 0.1 % of the radius.
         if radius < 1e-9 {
             return fail(span, "the arc has its centre where it begins");
         }
@@ -203,6 +210,8 @@ impl Gcode<'_> {
     /// Adds the moves of an arc: one if it is flat and less than a full circle, otherwise several
     /// without a stop.
     fn pieces(&mut self, helix: &Helix, goal: Vector3<f64>, speed: Speed, span: Span) -> Result<()> {
+        // A flat arc may be 315° long: beyond that its start and end are too close together to define
+        // the circle. Pieces of a helix begin with 90° and are halved until the error is allowed.
         let mut count = (helix.angle.abs() / if helix.rise == 0.0 { 1.75 * PI } else { PI / 2.0 }).ceil().max(1.0);
         while helix.rise != 0.0 && helix.distance_of_piece(0.0, 1.0 / count) > HELIX_ERROR {
             count *= 2.0;

@@ -66,6 +66,7 @@ impl Gcode<'_> {
         let Some(motion) = self.motion else {
             return fail(span, "coordinates without G0, G1, G2 or G3 in force: put one before them");
         };
+        // An arc must leave the rotary axes unchanged.
         let before = self.rotary;
         self.rotary_words(values)?;
         let is_arc = matches!(motion, Motion::Clockwise | Motion::Counterclockwise);

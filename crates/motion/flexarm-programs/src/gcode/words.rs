@@ -4,6 +4,8 @@
 //! Start at [`Parameters::line`]. Values are as written, without units. Parameters are numbered
 //! (`#1`) or named (`#<name>`); assignments of a line take effect after its words are read, as the
 //! standard says.
+//!
+//! Not here: what a word does (`modes`, `moves`, `frames`).
 
 use std::collections::HashMap;
 
@@ -129,7 +131,7 @@ impl Reader<'_> {
             let value = self.value()?;
             line.words.push(Word { letter, value, span: self.span(from) });
         }
-        // Line numbers say nothing.
+        // Line numbers have no effect.
         line.words.retain(|word| word.letter != 'N');
         Ok((line, set))
     }
@@ -167,6 +169,7 @@ impl Reader<'_> {
     fn inner_value(&mut self) -> Result<f64> {
         self.pass()?;
         let from = self.at;
+        // An expression in brackets, a parameter, a negated one of these, a function, or a number.
         match self.text.get(self.at) {
             // An expression in brackets.
             Some(b'[') => {

@@ -152,7 +152,7 @@ fn make(machine: &mut Krls<'_>, word: &str, arguments: &[Argument], span: Span) 
     if !is_joint && matches!(to, Target::Joints(_)) {
         return fail(span, "a path needs a target with X, Y, Z; axis values (A1...) are for PTP");
     }
-    // Knots of a spline are passed; other moves stop or blend as their words say.
+    // Knots of a spline are passed; other moves stop or blend by the words after the target.
     let blend = if machine.dialect.in_spline { Blend::Pass } else { blend(machine, arguments, span)? };
     let end = end_of_arc(machine, &context, &kind, &to, span);
     let step = Move { place: Place::default(), statement: String::new(), kind, to, X_WB, X_FT, speed, blend };
@@ -490,6 +490,7 @@ fn blend(machine: &mut Krls<'_>, arguments: &[Argument], span: Span) -> Result<B
     let mut result = Blend::Stop;
     for argument in arguments {
         let Some(word) = argument.name.as_deref() else { continue };
+        // Component of $APO that the word refers to, and the blend of its value.
         let (part, make): (&str, fn(f64) -> Blend) = match word {
             "c_ptp" => ("cptp", |percent| Blend::Fraction(percent / 200.0)),
             "c_dis" | "c_spl" => ("cdis", |mm| Blend::Distance(mm / 1000.0)),

@@ -166,6 +166,7 @@ fn routine(parser: &mut Parser) -> Result<Routine> {
     Ok(Routine { name, parameters, body, span })
 }
 
+/// Parses the parameters of a routine up to the closing parenthesis.
 fn parameters(parser: &mut Parser) -> Result<Vec<Parameter>> {
     let mut parameters = Vec::new();
     while !parser.take_symbol(")") {
@@ -174,6 +175,7 @@ fn parameters(parser: &mut Parser) -> Result<Vec<Parameter>> {
         }
         parser.take_symbol(",");
         parser.take_symbol("|");
+        // A backslash marks an optional parameter; VAR, PERS and INOUT mark returned ones.
         let optional = parser.take_symbol("\\");
         let returned = ["var", "pers", "inout"].iter().any(|word| parser.take_word(word));
         let kind = parser.expect_name()?;

@@ -21,6 +21,7 @@ pub(super) fn is_known(name: &str) -> bool {
     is_among(name, KNOWN)
 }
 
+/// Evaluates a built-in function.
 pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Argument], span: Span) -> Result<Value> {
     let mut values = Vec::with_capacity(arguments.len());
     for argument in arguments {
@@ -32,6 +33,7 @@ pub(super) fn function(machine: &mut UrScripts<'_>, name: &str, arguments: &[Arg
             value => values.push((argument.name.clone(), value)),
         }
     }
+    // The first group that knows the name computes the value.
     if name == "get_inverse_kin" {
         return inverse(&values, span);
     }

@@ -5,6 +5,8 @@
 //!
 //! Poses are m and rotation vectors in rad, in the robot's base; T is set by `set_tcp` on the
 //! flange F.
+//!
+//! Not here: threads, sensors, and set points streamed from outside, which are refused.
 
 mod functions;
 mod parse;

@@ -113,6 +113,7 @@ impl Reader {
         let start = self.parser.advance().span;
         let condition = self.parser.expression()?;
         self.parser.take_symbol(":");
+        // `while` has one body; `if` has branches, and what else is done.
         let action = if word == "while" {
             let body = self.block(&["end"])?;
             Action::While { condition: as_flag(condition), body }

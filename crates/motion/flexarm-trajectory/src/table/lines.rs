@@ -161,7 +161,7 @@ impl<'t> Table<'t> {
     fn read_comments(&mut self) -> Result<(), Box<Finding>> {
         for (i, line) in self.text.lines().enumerate().filter(|(_, line)| line.starts_with('#')) {
             let Some((key, value)) = line[1..].split_once(':') else { continue };
-            // Comments with other keys, or other units of time, say nothing here.
+            // Comments with other keys, or other units of time, are ignored here.
             let (line, value) = (i + 1, value.trim());
             match (key.trim(), value) {
                 ("unit", "rad" | "deg") => {

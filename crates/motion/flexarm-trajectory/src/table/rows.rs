@@ -95,7 +95,7 @@ impl Table<'_> {
                     continue;
                 }
             };
-            // A row that repeats the one before, with its time, says nothing.
+            // A row that repeats the one before, with its time, is left out.
             let is_same = |(values, value): (&Vec<f64>, &f64)| values.last() == Some(value);
             if rows.times.last().is_some_and(|last| time.since(*last) == 0.0)
                 && rows.values.iter().zip(&row).all(is_same)

@@ -55,13 +55,13 @@ pub(super) fn members() -> [Member; 3] {
 
 impl Member {
     /// Contribution of the beam to the compliance of the tip: as a cantilever in world axes, its
-    /// end moved to the tip by a lever.
+    /// end moved to the tip by a lever (m/N, rad/N; m/(N m), rad/(N m)).
     pub(super) fn at_tip(&self) -> Matrix6<f64> {
         at_lever(&turned(&self.section.tip_compliance(), &self.R), &(tip() - self.end))
     }
 }
 
-/// Compliance of the tip.
+/// Compliance of the tip, 6×6, in world axes (m/N, rad/N; m/(N m), rad/(N m)).
 pub(super) fn tip_compliance() -> Matrix6<f64> {
     members().iter().map(Member::at_tip).sum()
 }

@@ -81,6 +81,9 @@ impl Section {
 }
 
 /// Relative differences from beam theory of the stiffness of the middle layers and of the mass.
+///
+/// * `p_B`: interface B from A, in axes of the mesh (m).
+/// * `R`: rotation from the axes of the mesh to those of the section.
 fn middle_errors(
     member: &Member,
     mesh: &Meshed,

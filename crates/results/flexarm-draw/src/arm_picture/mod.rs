@@ -7,6 +7,8 @@
 //! without surfaces are drawn as rods. Start at [`arm_pictures`] for pages that explain the picture
 //! in their text, and at [`arm_png`] for a self-explanatory picture; [`arm_sheet`] shows both sides
 //! next to each other under a heading.
+//!
+//! Not here: projection, surfaces and pixels (`crate::mesh_picture`), charts (`crate::plot`).
 
 pub(crate) mod ellipsoid;
 pub(crate) mod legend;
@@ -138,6 +140,7 @@ pub fn arm_sheet(
     let top = (unit * (24.0 + 24.0 * lines.len() as f64)) as usize;
     let height = half * 7 / 9;
     let mut sheet = Image::new(2 * half, top + height, color::PAPER);
+    // Both sides next to each other, under the lines of text.
     for (k, side) in [ArmSide::Side, ArmSide::Oblique].into_iter().enumerate() {
         sheet.paste(&stage.explained(side, [half, height], header, ellipsoid.as_ref()), k * half, top);
     }

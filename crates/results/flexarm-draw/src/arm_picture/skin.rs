@@ -46,13 +46,13 @@ pub(super) fn bodies(header: &RunHeader, sample: &Sample) -> Vec<Body> {
         firsts.push(first);
         first += bend.X_LS.len();
     }
-    let of = |mesh: LinkMesh| {
+    let body = |mesh: LinkMesh| {
         let found = header.bends.iter().zip(&firsts).find(|(bend, _)| bend.link == mesh.link);
         let bent = found
             .and_then(|(bend, first): (&BendInfo, _)| Some((BentMesh::new(&mesh, bend)?, *first, bend.X_LS.len())));
         Body { link: mesh.link, bent, mesh }
     };
-    meshes.into_iter().map(of).collect()
+    meshes.into_iter().map(body).collect()
 }
 
 /// Maximum distance of a link from the base (m).

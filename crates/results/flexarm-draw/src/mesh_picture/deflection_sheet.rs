@@ -149,6 +149,7 @@ fn draw(pictures: &MeshPictures<'_>, title: &str, remark: &str, panels: Vec<Pane
 }
 
 impl Panel {
+    /// Draws the deformed surface seen from `toward` (link axes), with the undeformed edges.
     fn draw(&self, pictures: &MeshPictures<'_>, toward: Vector3<f64>, [width, height]: [usize; 2]) -> Image {
         // Deformed surface, with a peak of fixed size in the picture.
         let surface = &pictures.surface;

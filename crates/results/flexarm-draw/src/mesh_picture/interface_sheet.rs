@@ -142,6 +142,7 @@ impl Content {
         Self { colors, bright, side, glass, marks, spacing: spacing.collect() }
     }
 
+    /// Draws the body with its tied faces, seen from `toward` (link axes).
     fn panel(
         &self,
         pictures: &MeshPictures<'_>,

@@ -76,7 +76,8 @@ pub(super) fn area(value: f64) -> String {
     format!("{} cm²", significant(value * 1e4, 3))
 }
 
-/// Returns the largest of 1, 2, 5, 10, ... that does not exceed `limit`.
+/// Returns the largest of 1, 2, 5, 10, ... that does not exceed `limit`. In the unit of the limit,
+/// which is positive.
 pub fn round_below(limit: f64) -> f64 {
     let decade = 10_f64.powi(limit.log10().floor() as i32);
     [5.0, 2.0, 1.0].into_iter().map(|k| k * decade).find(|x| *x <= limit * (1.0 + 1e-12)).unwrap_or(decade)

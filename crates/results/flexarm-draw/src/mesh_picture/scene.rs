@@ -195,7 +195,8 @@ impl Canvas {
         canvas
     }
 
-    /// Of two triangles at equal depth the first is kept.
+    /// Draws a triangle with its `normals` at the corners (axes of the scene). Of two triangles at
+    /// equal depth the first is kept.
     fn triangle(&mut self, scene: &Scene<'_>, number: usize, normals: &[Vector3<f64>; 3]) {
         let View { right, up, toward, .. } = self.view;
         let vertices = scene.triangles[number].map(|v| v as usize);
@@ -204,6 +205,7 @@ impl Canvas {
         cover(corners, [self.width, self.height], |x, y, weights| {
             let mean =
                 |values: [f64; 3]| -> f64 { values.iter().zip(weights).map(|(value, weight)| value * weight).sum() };
+            // Depth and light are interpolated from the corners.
             let (at, depth) = (y * self.width + x, mean(corners.map(|p| p[2])) as f32);
             if depth > self.depths[at] {
                 let light = mean(light);
@@ -278,6 +280,7 @@ impl Canvas {
         }
     }
 
+    /// Draws a line in space, fainter where a surface hides it.
     fn line(&mut self, from: &Vector3<f64>, to: &Vector3<f64>, width: f64, color: Rgb, alpha: [f64; 2]) {
         let (a, b) = (self.view.project(from), self.view.project(to));
         let size = [self.width, self.height];

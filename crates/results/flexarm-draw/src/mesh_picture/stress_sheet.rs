@@ -84,6 +84,8 @@ pub fn side_of_worst(picture: &StressPicture<'_>, axes: &LinkAxes) -> Vector3<f6
     across.try_normalize(1e-12).unwrap_or(axes.out)
 }
 
+/// Draws one view of the stress, with labels.
+///
 /// * `visible`: number and node of the worst places that face the viewer.
 fn panel(
     picture: &StressPicture<'_>,

@@ -55,6 +55,7 @@ fn swatch(style: &Style) -> u32 {
     2 * style.legend_font
 }
 
+/// Draws the legend: per row the curves with their horizontal positions in pixels.
 pub(super) fn draw_legend(
     strip: &Area<'_>,
     rows: &[Vec<(usize, u32)>],
@@ -68,6 +69,7 @@ pub(super) fn draw_legend(
             let (curve, x, look) = (curves[*k], *x as i32, style_of(curves[*k], curves, style));
             let (from, middle, to) = (x, y + font / 2, x + font * 3 / 2);
             let cut = (to - from) / 3;
+            // Sample of the curve: a dot, two dashes or a line.
             let lines = match curve.look {
                 CurveLook::Dots => {
                     let dot = Circle::new(((from + to) / 2, middle), dot_radius(style), look.filled());

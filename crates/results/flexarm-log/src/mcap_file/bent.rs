@@ -47,6 +47,8 @@ impl BentLink {
         header.bends.iter().filter_map(link).collect()
     }
 
+    /// Prepares the messages of a bend; `None` without a line to bend.
+    ///
     /// * `first`: index of its first station in [`TwinSample::X_WS`].
     pub fn new(bend: &BendInfo, first: usize) -> Option<Self> {
         let line = BendLine::new(bend)?;

@@ -172,10 +172,12 @@ impl Frames {
             self.tree(&mut transforms, magnified, moving, Tree::Magnified);
         }
         if moving == Moving::Yes {
+            // Stations of the bends, relative to their link.
             for ((link, child), X_WS) in self.stations.iter().zip(&sample.flexible.X_WS) {
                 let X_PC = sample.flexible.X_WL[*link].inv_mul(X_WS);
                 transforms.push(Transform { parent: &self.links[*link].names[0], child, X_PC, coarse: false });
             }
+            // Slabs of the bent meshes, which move with the visible arm.
             let (tree, twin) = match &self.magnifier {
                 Some(_) => (Tree::Magnified, &self.magnified),
                 None => (Tree::Flexible, &sample.flexible),

@@ -216,6 +216,7 @@ impl McapFile {
         if let Some(RigidChannels { joint_states, tcp, .. }) = self.channels.rigid {
             self.robot(joint_states, tcp, stamp, &sample.rigid)?;
         }
+        // Signals that are rows of numbers, each in its own channel.
         let [x, y, z, rx, ry, rz] = sample.error_world;
         let error = [x, y, z, rx, ry, rz, (x * x + y * y + z * z).sqrt()];
         let energy = [sample.energy.kinetic, sample.energy.potential, sample.energy.elastic];

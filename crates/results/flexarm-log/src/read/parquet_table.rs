@@ -111,7 +111,7 @@ impl RowGroups {
     }
 }
 
-/// Opens a file, and checks what it says that it unpacks to.
+/// Opens a file, and checks the uncompressed size that it states.
 ///
 /// # Errors
 /// [`ParquetError`] if the file is not Parquet, or is too large for its length.

@@ -102,6 +102,7 @@ pub fn lint(root: Node<'_, '_>, lines: &Lines<'_>, report: &mut Report) -> Optio
         report.error(&place, "too-many-elements", message, help);
         return None;
     }
+    // Newer versions of URDF have quaternions and joints without limits.
     let version = version(root);
     let (quaternions, open_limits) = (version >= (1, 1), version >= (1, 2));
     let lint = Lint { lines, report, quaternions, open_limits, owner: "the robot".to_owned(), text: String::new() };

@@ -76,6 +76,7 @@ fn asset_transform(root: Node<'_, '_>, up_axis: UpAxis, remarks: &mut Vec<String
         return Matrix4::new_scaling(meter);
     }
     let up = asset.and_then(|a| named(a, "up_axis")).and_then(|u| u.text()).map_or("Y_UP", str::trim);
+    // Rotation that brings the up axis of the file to z.
     let R_VF = match up {
         "Z_UP" => Matrix3::identity(),
         "X_UP" => Matrix3::from_columns(&[Vector3::z(), -Vector3::x(), -Vector3::y()]),
@@ -132,6 +133,7 @@ impl<'a, 'i> Reader<'a, 'i> {
                     let Some(geometry) = self.target(child, "url") else {
                         return Err(self.malformed(child, "it refers to a geometry that does not exist"));
                     };
+                    // Materials bound to the symbols of the geometry.
                     let bound = child.descendants().filter(|n| n.tag_name().name() == "instance_material");
                     let materials =
                         bound.filter_map(|m| Some((m.attribute("symbol")?, self.target(m, "target")?))).collect();
@@ -172,6 +174,8 @@ impl<'a, 'i> Reader<'a, 'i> {
         Ok(T)
     }
 
+    /// Adds the triangles of a geometry G, with the colours of their materials; other primitives
+    /// are noted.
     fn geometry(
         &mut self,
         geometry: Node<'a, 'i>,

@@ -183,6 +183,7 @@ fn read_buffers<'a>(root: &Root, mut blob: Option<&'a [u8]>, path: &Path) -> Res
                     .ok_or_else(|| malformed(path, "a buffer is not base64 text"))?
                     .into(),
                 None => {
+                    // A file beside this one.
                     let file = path.with_file_name(uri);
                     check_inside(path, &file).map_err(|reason| malformed(path, reason))?;
                     if !file.is_file() {

@@ -116,6 +116,7 @@ impl ExpandedText {
     }
 }
 
+/// Writes an element and its children, one per line, indented by depth.
 fn write_element(element: &Element, namespaces: &[(String, String)], depth: usize, out: &mut ExpandedText) {
     let mut tag = format!("<{}", element.name);
     for (name, value) in element.attributes.iter().chain(namespaces) {
@@ -126,6 +127,7 @@ fn write_element(element: &Element, namespaces: &[(String, String)], depth: usiz
         _ => None,
     };
     let has_content = element.children.iter().any(|node| matches!(node, Node::Element(_)) || words(node).is_some());
+    // An element without content closes itself; one with text alone stays on its line.
     if !has_content {
         out.line(depth, &format!("{tag}/>"), &element.at);
         return;

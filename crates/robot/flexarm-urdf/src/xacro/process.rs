@@ -282,6 +282,7 @@ impl Interpreter<'_> {
         Ok(nodes)
     }
 
+    /// Reads an included file, and expands it in the place of the include.
     fn included(&mut self, path: &Path, at: &Place, macros: &Rc<Macros>, scope: &Scope) -> Outcome<Vec<Node>> {
         if self.files.len() >= MAX_FILES {
             let trouble = ExpressionError::new(format!("files include each other more than {MAX_FILES} deep"));

@@ -136,6 +136,7 @@ impl Interpreter<'_> {
     /// Value of a name in a scope; a text is evaluated now, in the table that contains it.
     pub(crate) fn property(&mut self, scope: &Scope, name: &str) -> Result<Option<Value>, ExpressionError> {
         let mut table = scope;
+        // Innermost table that has the name.
         let entry = loop {
             self.charge(1)?;
             if let Some(entry) = table.entries.borrow().get(name) {
@@ -151,6 +152,7 @@ impl Interpreter<'_> {
             State::Evaluating => Err(ExpressionError::new(format!("the property {name:?} is defined by itself"))
                 .help("give it another name, or write lazy_eval=\"false\" to use the value that it had before")),
             State::Unevaluated => {
+                // The mark finds a property that refers to itself.
                 table.put(name, entry.value.clone(), State::Evaluating, entry.at.clone());
                 self.deeper()?;
                 let value = self.text(&entry.value.shown(), table).map_err(|trouble| match &entry.at {

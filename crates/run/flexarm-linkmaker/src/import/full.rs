@@ -41,6 +41,7 @@ pub(super) fn propose(imported: &ImportedMatrices) -> String {
             <[f64; 3]>::from(high)
         );
     }
+    // Reference nodes usually are the last ones of the model.
     let mut nodes: Vec<i64> = imported.stiffness.rows.iter().filter_map(|label| label.node).collect();
     nodes.sort_unstable();
     nodes.dedup();
@@ -96,7 +97,7 @@ pub(super) fn reduce(
     let options = CondensationOptions::default();
     let rows = &imported.stiffness.rows;
     match map {
-        // Six rows per interface: angles where the map says so, whatever their label.
+        // Six rows per interface: angles where the map has them, regardless of their labels.
         ImportMap::Rows(map) => {
             let boundary = boundary_rows(imported, map)?;
             let mut is_turn: Vec<bool> = rows.iter().map(|label| label.dof > 3).collect();

@@ -138,6 +138,7 @@ pub fn import(job: &ImportJob, outputs: Option<&ImportOutputs>) -> Result<Import
         check_apart(&targets.all(), &inputs)?;
         check_free(&targets.all(), targets.overwrite)?;
     }
+    // The first file shows the format: a modal body, or matrices.
     let first = job.files.first().ok_or_else(|| LinkError::Job("no file to import is given".into()))?;
     let head = InputFile::open(first).map_err(Box::new)?;
     let (reduction, parts) = if recognise(&head.bytes) == Some(MatrixFormat::Sid) {
@@ -308,6 +309,7 @@ fn reduced(
         let modes = Setting::Modes;
         warnings.push(format!("{modes} applies only to full models; these matrices are already reduced"));
     }
+    // Matrices that are reduced already: rows of the interfaces, converted to SI.
     let reduced = assemble_interfaces(imported, layout.map.rows(), Some(&units)).map_err(Box::new)?;
     let (has_mass, n) = (reduced.M.is_some(), reduced.K.nrows());
     let M = reduced.M.unwrap_or_else(|| DMatrix::zeros(n, n));
@@ -474,6 +476,7 @@ fn in_file(
             return Ok((!points.is_empty()).then(|| (at(sum / points.len() as f64), "the centroid of its nodes")));
         }
     };
+    // Sources in this order: sidecar, node of the interface, frames of the file.
     let interface = &map.interfaces[k];
     if let Some(side) = imported.sidecar.as_ref().and_then(|s| s.interfaces.iter().find(|i| i.interface == *interface))
     {

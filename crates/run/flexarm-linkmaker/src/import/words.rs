@@ -45,6 +45,7 @@ impl FromStr for ImportMap {
         if !values().any(is_nodes) {
             return text.parse().map(Self::Rows).map_err(|error| WordError(error.to_string()));
         }
+        // Planes: a point and a normal per interface.
         let one = |part: &&str| {
             let wrong = || WordError::form(part, "NAME=plane(x,y,z;nx,ny,nz) for every interface");
             let (name, value) = part.split_once('=').ok_or_else(wrong)?;

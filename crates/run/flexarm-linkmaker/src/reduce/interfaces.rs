@@ -261,6 +261,7 @@ impl MeshFrame<'_> {
                 ));
             }
         }
+        // The interfaces should be about as far apart as their nodes.
         if let [a, b, ..] = chosen {
             let X = [a, b].map(|one| one.interface.X_LI.translation.vector);
             let (apart, nodes) = ((X[1] - X[0]).norm(), (b.centroid - a.centroid).norm());

@@ -227,6 +227,7 @@ fn materials(
     figures
 }
 
+/// Whether two materials differ in E, ν or ρ by more than 1e-6, relative.
 fn differ(a: &Material, b: &Material) -> bool {
     [(a.E, b.E), (a.nu, b.nu), (a.rho, b.rho)].into_iter().any(|(a, b)| (a - b).abs() > 1e-6 * a.abs().max(b.abs()))
 }
@@ -238,6 +239,7 @@ fn wanted_modes(job: &ReduceJob) -> ModesWanted {
     }
 }
 
+/// Collects the settings of the reduction from the job and the mesh, with their defaults.
 fn plan(
     job: &ReduceJob,
     file: &MeshFile,

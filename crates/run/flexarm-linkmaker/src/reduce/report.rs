@@ -89,6 +89,7 @@ fn interfaces(summary: &ReduceSummary) -> ReportTable {
     ReportTable::new("interfaces (m, link frame)", &header, rows.collect())
 }
 
+/// Table of the checks: measured value, usual range, judgement.
 fn checks(summary: &ReduceSummary) -> ReportTable {
     let c = &summary.checks;
     let limits = GateLimits::default();

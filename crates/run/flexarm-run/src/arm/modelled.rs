@@ -183,6 +183,7 @@ impl Robot {
                 hysteresis: damping.hysteresis.as_ref().map(|found| found.law.clone()),
                 geometric: None,
             };
+            // A guide replaces the linear spring by its law.
             if let (Some(tubes), Some(tilt)) = (self.drives[number].guide(), damping.tilts.get(gear.component)) {
                 let body = model.bodies().iter().find(|body| body.joint == gear.gearbox);
                 let joint = self.rigid.joint(&gear.gearbox);

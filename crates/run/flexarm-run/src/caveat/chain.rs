@@ -34,7 +34,7 @@ pub(crate) fn of_payload(robot: &Robot, size: &Size, what: &str, link: &str) -> 
     of_place(robot, size, what, link, [&kinds::PAYLOAD_FIXED, &kinds::PAYLOAD_INSIDE])
 }
 
-/// Checks the link of something that belongs to the end of the arm. Kinds of caveats: no joint
+/// Checks the link of a payload or tool, which belongs to the end of the arm. Kinds of caveats: no joint
 /// moves the link; the arm continues beyond it.
 fn of_place(robot: &Robot, size: &Size, what: &str, link: &str, [fixed, inside]: [&FindingKind; 2]) -> Option<Finding> {
     let mechanism = &robot.urdf.mechanism;

@@ -103,8 +103,8 @@ fn distances<'a>(mechanism: &'a Mechanism, size: &'a Size) -> impl Iterator<Item
 /// of osmium.
 fn bodies(mechanism: &Mechanism, size: &Size) -> Vec<Finding> {
     let with_mass = || {
-        let of = |l: &Link| l.inertia.filter(|i| i.mass > 0.0).map(|i| (l.name.clone(), i));
-        mechanism.links.iter().filter_map(of)
+        let inertia_of = |l: &Link| l.inertia.filter(|i| i.mass > 0.0).map(|i| (l.name.clone(), i));
+        mechanism.links.iter().filter_map(inertia_of)
     };
     let far_out = with_mass().map(|(name, i)| size.at(&name) + i.com.norm()).fold(0.0, f64::max);
     let mut caveats = Vec::new();

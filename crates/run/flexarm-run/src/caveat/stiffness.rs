@@ -59,11 +59,11 @@ fn copied(link: &RobotLink) -> Option<String> {
         (diagonal(&reduced.split.K_S), "the diagonal of the spring's own 6x6"),
     ];
     let factors = [(1.0, ""), (1e3, " times 1000"), (1e-3, " over 1000")];
-    let of = |(K, words): &(Matrix6<f64>, &str)| {
+    let explanation = |(K, words): &(Matrix6<f64>, &str)| {
         let same = |(factor, _): &&(f64, &str)| (given - K * *factor).norm() < SAME * (K * *factor).norm();
         factors.iter().find(same).map(|(_, times)| format!("{words}{times}?"))
     };
-    sources.iter().find_map(of)
+    sources.iter().find_map(explanation)
 }
 
 /// Returns the minimum and maximum ratio of a stiffness to another over all directions: the eigenvalues

@@ -519,12 +519,14 @@ fn part(
              every step: use kind = \"table\" for curves without a short formula"
         )));
     }
+    // Parse, and allow t as the only variable.
     let parsed: FlatEx<f64> =
         exmex::parse(&without_exponents(text)).map_err(|error| fail(format!("expression {text:?}: {error}")))?;
     let unknown: Vec<&String> = parsed.var_names().iter().filter(|v| *v != "t").collect();
     if !unknown.is_empty() {
         return Err(fail(format!("expression {text:?} has the variables {unknown:?}; only t (s) is known")));
     }
+    // Probe the value at three instants.
     let timed = !parsed.var_names().is_empty();
     for t in [start.max(0.0), 0.5 * (start.max(0.0) + end), end] {
         let probe = parsed.eval(if timed { std::slice::from_ref(&t) } else { &[] });

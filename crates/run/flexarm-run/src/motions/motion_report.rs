@@ -172,6 +172,7 @@ pub fn motion_report(
     rate_hz: f64,
     overwrite: bool,
 ) -> Result<MotionReport, Error> {
+    // Refuse bad outputs before the motion is computed.
     for output in outputs {
         Target::of(output)?;
     }
@@ -183,6 +184,7 @@ pub fn motion_report(
         None => alone(path, options)?,
     };
     report.curves = curves(&trajectory);
+    // Texts of all outputs, then all files at once.
     let mut files = Vec::new();
     for output in outputs {
         let target = Target::of(output)?;

@@ -208,12 +208,14 @@ impl<'a> Stage<'a> {
     /// Fills the sample of a step with the free coordinates `x`: motors under servos, then springs.
     fn sample(&mut self, step: u64, x: &DVector<f64>) -> &Sample {
         let driven = &self.posed.plant.torque_driven;
+        // Motors driven by torque, then elastic coordinates.
         for (value, &k) in x.iter().zip(driven) {
             self.q[k] = *value;
         }
         let (first, ne) = (self.q.len() + driven.len() - x.len(), x.len() - driven.len());
         self.q.rows_mut(first, ne).copy_from(&x.rows(driven.len(), ne));
         forward_kinematics(&self.posed.plant.model, &mut self.data, &self.q);
+        // Poses of links and stations, and the difference of the tool from the undeformed arm.
         let sample = &mut self.sample;
         sample.time_s = step as f64 / RATE_HZ;
         sample.step = step;
@@ -223,6 +225,7 @@ impl<'a> Stage<'a> {
         sample.flexible.X_WS.extend(self.stations.iter().map(|f| self.data.X_WF(f)));
         sample.flexible.X_WT = self.data.X_WF(&self.posed.tool);
         sample.error_world = tcp_error(&sample.rigid.X_WT, &sample.flexible.X_WT);
+        // Deflections, and the loads of linear springs.
         for (elastic, (_, range)) in sample.elastic.iter_mut().zip(&self.linear.elements) {
             let n = range.len();
             let deflection = x.rows(range.start, n);

@@ -465,6 +465,7 @@ fn torques(trace: &Trace) -> Plot {
         let table = Table::new(trace.curve_times(), curves, MAX_DETAIL);
         views.push(PlotView { name: name.clone(), y_unit, tables: vec![table] });
     }
+    // Unit of the common plot.
     let all_slide = !names.is_empty() && (0..names.len()).all(|k| slides(trace, k));
     let none_slides = (0..names.len()).all(|k| !slides(trace, k));
     let y_unit = if all_slide {

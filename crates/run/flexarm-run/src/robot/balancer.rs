@@ -196,6 +196,7 @@ pub(crate) fn check_pose(model: &Model, data: &mut Data, q: &DVector<f64>) -> Re
         let length = balancer.length(&data.X_WB, q.as_slice());
         let name = balancer.name.clone();
         match &balancer.law {
+            // Beyond the end of its stroke the gas has no volume.
             BalancerLaw::Gas(gas) if gas.volume_ratio(length) <= 0.0 => {
                 let beyond = if gas.pulls { "above" } else { "below" };
                 let message = format!(

@@ -53,6 +53,7 @@ pub(crate) fn calibrate(
                 continue;
             }
         };
+        // X_PJ times the correction of the frame and of the zero.
         for mechanism in mechanisms.iter_mut() {
             let joint = mechanism.joints.iter_mut().find(|joint| joint.name == calibration.joint);
             if let Some(joint) = joint {

@@ -305,6 +305,7 @@ fn check_joint(
     mechanism: &Mechanism,
     fail: &impl Fn(Range<usize>, String) -> RobotFileError,
 ) -> Result<(), RobotFileError> {
+    // Settings that only a motor can have.
     let of_motor = entry.friction.is_some()
         || entry.servo.is_some()
         || entry.motor_inertia.is_some()

@@ -35,6 +35,7 @@ impl Robot {
         if entry.beam.is_none() {
             return Err(fail("mass belongs to beams; the parts of a .flex file have their own masses".into()));
         }
+        // Inertia about the centre of mass scales with the mass.
         let mut found = false;
         for mechanism in [&mut self.rigid, &mut self.urdf.mechanism] {
             let link = mechanism.links.iter_mut().find(|link| link.name == *name);

@@ -104,6 +104,7 @@ fn rosette(entry: &StrainGaugeEntry, links: StressLinks<'_>, source: &Source) ->
         );
         return Err(source.error(angles.span(), message));
     }
+    // One grid per angle, with a name of its own.
     let grid = |(k, angle): (usize, &f64)| {
         let repeated = angles.get_ref()[..k].contains(angle);
         let name = format!("{}_{angle}", gauge.name);
@@ -128,6 +129,7 @@ fn place(
         return Err(source.error(name.span(), message));
     }
     let fail = |message: String| source.error(link.span(), format!("{text:?}: {message}"));
+    // The link must be flexible and have a stress model.
     let Some((_, has_stress)) = links.iter().find(|(known, _)| known == link.get_ref()) else {
         let known = links.iter().map(|(link, _)| *link);
         let meant =

@@ -226,6 +226,7 @@ fn stiffness_of(
         }
         _ => return Err(at("stiffness takes one number, 3, 6 or a 6x6 matrix".into())),
     };
+    // A matrix must be symmetric and positive definite; numbers must be positive.
     if let GearStiffness::Full(K) = &stiffness {
         let K = spring_stiffness(K).map_err(|error| at(format!("stiffness: {error}")))?;
         return Ok((GearStiffness::Full(K), size));

@@ -329,6 +329,7 @@ fn matrix6(
 /// Reads the damping of a link or a mounting; 3 % modal damping by default.
 pub(crate) fn damping_of(entry: Option<&Spanned<DampingEntry>>, source: &Source) -> Result<Damping, RobotFileError> {
     let Some(entry) = entry else { return Ok(Damping::Modal(0.03)) };
+    // Exactly one kind; NaN in one Rayleigh number must reach the check below.
     let (value, damping) = match entry.get_ref() {
         DampingEntry { modal: Some(zeta), stiffness_beta: None, rayleigh: None } => (*zeta, Damping::Modal(*zeta)),
         DampingEntry { modal: None, stiffness_beta: Some(beta), rayleigh: None } => {

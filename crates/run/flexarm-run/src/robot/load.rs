@@ -179,6 +179,7 @@ impl Robot {
         files: &FileCache,
     ) -> Result<Arc<Arm>, Error> {
         let folder = path.parent().unwrap_or(Path::new("."));
+        // Faults of all entries are collected, so that one call reports them together.
         let mut faults: Vec<Error> = Vec::new();
         let (rigid, calibration) = changed_mechanism(&mut urdf.mechanism, file, source, &mut faults);
         let tcp = keep(tcp_of(file, source, &urdf, options), &mut faults);
@@ -309,6 +310,7 @@ fn changed_mechanism(
     faults: &mut Vec<Error>,
 ) -> (Mechanism, Vec<Calibration>) {
     let mut rigid = urdf.clone();
+    // Gravity and helical joints belong to the rigid robot alone.
     if let Some(gravity) = &file.gravity {
         rigid.gravity = (*gravity.get_ref()).into();
         keep(check_finite("gravity", gravity.get_ref(), gravity.span(), source).map_err(Error::from), faults);
@@ -316,6 +318,7 @@ fn changed_mechanism(
     for (joint, lead) in &file.lead {
         keep(make_helical(&mut rigid, joint, lead, source).map_err(Error::from), faults);
     }
+    // Calibration and masses go into both mechanisms.
     let (calibration, wrong) = calibrate(&file.calibration, &mut [&mut rigid, urdf], source);
     faults.extend(wrong.into_iter().map(Error::from));
     for entry in &file.inertial {

@@ -95,6 +95,7 @@ impl Robot {
         for (link, p) in [&pin, &eye] {
             check_point(&self.rigid, link, p).map_err(|what| Error::Loop { name: name.clone(), what })?;
         }
+        // Axis of the pin, or else of a dependent joint.
         let axis = match axis {
             None => axis_of_joint(&self.rigid, &pin.0, &dependent).ok_or_else(|| Error::Loop {
                 name: name.clone(),
@@ -110,6 +111,7 @@ impl Robot {
                     what: format!("axis is {axis:?}, expected the direction of the pin in axes of its link"),
                 })?,
         };
+        // Points of the loop as frames of the mechanism.
         let frames = ["pin", "eye"].map(|end| format!("__loop_{name}_{end}"));
         for ((link, p), frame) in [pin, eye].iter().zip(&frames) {
             add_point(&mut self.rigid, link, *p, frame);

@@ -179,7 +179,7 @@ fn riding_mass(
         }
         return Ok(None);
     };
-    // A given mass, with its inertia about its centre; none is no body at all.
+    // A mass with its inertia about its centre; without a mass there is no body.
     let (kg, com) = (*mass.get_ref(), given.com.unwrap_or_default());
     if !(kg.is_finite() && kg >= 0.0) {
         return Err(source.error(mass.span(), format!("mounting mass is {kg} kg, it must be 0 or positive")).into());

@@ -140,6 +140,7 @@ fn left_out(posed: &Posed) -> Vec<String> {
     add(!bent.is_empty(), format!("play and nonlinear stiffness of {}: a constant stiffness is written", named(bent)));
     let stiffened = arm.elements.iter().any(|element| element.geometric.is_some());
     add(stiffened, "stiffness that depends on the load".into());
+    // Joints of six degrees of freedom become three revolute ones in a row.
     let turns = |e: &&flexarm_stepping::ElasticElement| {
         arm.model.bodies()[e.body].motion == JointMotion::Elastic(ElasticAngles::RotationVector)
     };

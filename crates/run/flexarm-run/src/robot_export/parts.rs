@@ -141,6 +141,7 @@ pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, Error> {
             return Err(not_exportable(&parts[light].name, "a moving body without mass"));
         };
         let (above, X_LC) = (parts[light].clone(), parts[child].X_PB);
+        // Joints and shapes of the body, in the frame of its child.
         let moved = above.joints.into_iter().map(|axis| Axis {
             axis: X_LC.rotation.inverse() * axis.axis,
             anchor: X_LC.rotation.inverse() * (axis.anchor - X_LC.translation.vector),
@@ -148,12 +149,14 @@ pub(super) fn with_mass(mut parts: Vec<Part>) -> Result<Vec<Part>, Error> {
         });
         let shapes = above.shapes.into_iter().map(|shape| Shape { X_BV: X_LC.inverse() * shape.X_BV, ..shape });
         let part = &mut parts[child];
+        // The child takes the place of the body; later indices decrease by one.
         part.joints.splice(0..0, moved);
         part.shapes.extend(shapes);
         (part.parent, part.X_PB) = (above.parent, above.X_PB * X_LC);
         parts.remove(light);
         parts.iter_mut().filter(|part| part.parent > light).for_each(|part| part.parent -= 1);
     }
+    // No principal moment may exceed the sum of the other two.
     let refused = |part: &&Part| {
         let moments = part.inertia.symmetric_eigenvalues();
         part.mass > 0.0 && (moments.min() < MIN_INERTIA || 2.0 * moments.max() > moments.sum() * (1.0 + 1e-9))

@@ -55,6 +55,7 @@ pub(super) fn text(robot: &Robot, posed: &Posed, parts: &[Part]) -> String {
     out + "</robot>\n"
 }
 
+/// Writes a link with its inertia and visual meshes.
 fn link(out: &mut String, part: &Part) {
     let _ = writeln!(out, "  <link name=\"{}\">", markup(&part.name));
     if part.mass > 0.0 {

@@ -114,7 +114,7 @@ const MAGNIFICATIONS: std::ops::RangeInclusive<f64> = 1e-3..=1e6;
 
 /// Checks that the options are valid, and that step size and duration give a finite run.
 fn check_options(motion: &Motion, options: &RunOptions) -> Result<(), Error> {
-    // Each number by itself.
+    // Each number on its own.
     for (setting, what, x, unit) in [
         (Setting::Step, "step", options.step_s, "s"),
         (Setting::LogRate, "log rate", options.log_rate_hz, "Hz"),

@@ -12,6 +12,9 @@
 //! ```
 //! On a helical tooth the edge at height z lags by the angle `2 z tan(helix) / diameter`; the
 //! integral over the depth is in closed form.
+//!
+//! Not here: times at which teeth enter and leave (`period.rs`), entries of tool files
+//! (`tool_file.rs`).
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -47,7 +50,8 @@ impl Engagement {
         Self { entry: 0.0, exit: (1.0 - 2.0 * immersion).clamp(-1.0, 1.0).acos() }
     }
 
-    /// Returns the engagement of down-milling: the chip thickness decreases to zero.
+    /// Returns the engagement of down-milling: the chip thickness decreases to zero. `immersion` as
+    /// in [`Engagement::up`].
     pub fn down(immersion: f64) -> Self {
         Self { entry: (2.0 * immersion - 1.0).clamp(-1.0, 1.0).acos(), exit: PI }
     }

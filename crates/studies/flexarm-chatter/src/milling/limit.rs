@@ -116,9 +116,9 @@ pub fn limit_of_depth(
     Ok(Some(described(structure, cutter, spindle, &period, depth, change)))
 }
 
-/// Computes all ranges of depth up to the maximum in which the cut chatters. The first limit has
-/// the given tolerance; the other ends are those of elements refined once. The last range may end
-/// at the maximum depth.
+/// Computes all ranges of depth (m) up to the maximum in which the cut chatters. The first limit
+/// has the given tolerance; the other ends are those of elements refined once. The last range may
+/// end at the maximum depth.
 ///
 /// Cost: that of a limit, plus an eigenvalue problem per further depth of the search. Ranges
 /// narrower than a step may be missed.
@@ -131,6 +131,7 @@ pub fn unstable_ranges(
     spindle: f64,
     options: &LimitOptions,
 ) -> Result<Vec<(f64, f64)>, ChatterError> {
+    // The cut chatters from the first limit on.
     let Some(first) = limit_of_depth(structure, cutter, spindle, options)? else { return Ok(Vec::new()) };
     let longest = first_length(structure, cutter, spindle, options) / 2.0;
     let period = Period::new(structure, cutter, spindle, longest);
@@ -138,6 +139,7 @@ pub fn unstable_ranges(
     let mut ranges = Vec::new();
     let mut start = Some(first.depth);
     let (mut depth, mut size) = (first.depth * (1.0 + 1e-6), f64::NAN);
+    // Increase the depth by a constant ratio: a change of sign of the growth is the end of a range.
     while depth < options.deepest {
         let next = (depth * step_ratio(options)).min(options.deepest);
         let next_size = growth(&period, next);
@@ -155,7 +157,7 @@ pub fn unstable_ranges(
     Ok(ranges)
 }
 
-/// Computes the largest Floquet multiplier over one tooth period at a depth. The elements are
+/// Computes the largest Floquet multiplier over one tooth period at a depth (m). The elements are
 /// refined until its magnitude converges to `1e-6`.
 ///
 /// # Errors

@@ -13,6 +13,8 @@
 //! In terms of its error this is a semi-discretisation [Insperger & Stépán 2004] of the whole
 //! force, that is, a full discretisation [Ding 2010], with elements of sixth order in place of
 //! steps of first order.
+//!
+//! Not here: the search for the limit (`limit.rs`), the force of a tooth (`cutter.rs`).
 
 use nalgebra::{Complex, DMatrix, Matrix3, Vector3};
 

@@ -6,6 +6,8 @@
 //! Any linear structure without defective poles has this form: modes with damping ratios, or `M`,
 //! `D`, `K` with any damping ([`Structure::from_matrices`]). Structures in series, such as a tool
 //! on a flange, have the poles of both.
+//!
+//! Not here: the arm and its pose (`place.rs` of the crate).
 
 use nalgebra::{Complex, Matrix3, Vector3};
 
@@ -100,7 +102,8 @@ impl Structure {
         self
     }
 
-    /// Returns the structure in other axes, `u_new = R u`, `F_new = R F`.
+    /// Returns the structure in other axes, `u_new = R u`, `F_new = R F`. `R` has the old
+    /// axes as columns, in the new ones.
     #[must_use]
     pub fn rotated(mut self, R: &Matrix3<f64>) -> Self {
         let R = R.map(|x| Complex::new(x, 0.0));

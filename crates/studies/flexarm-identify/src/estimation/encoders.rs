@@ -102,7 +102,7 @@ pub fn gear_stiffness(runs: &[Vec<GearOutput>]) -> Option<Vec<GearEstimate>> {
     let others = |run: usize| all.iter().copied().filter(|k| *k != run).collect::<Vec<_>>();
     let without: Vec<Fit> = all.iter().map(|run| Fit::of(runs, &others(*run), None)).collect::<Option<_>>()?;
     // Per spring: both jackknives, and what the torque explains of seen and unseen runs.
-    let of = |motor: usize| {
+    let fitted = |motor: usize| {
         let scatter = |fits: &[Fit]| jackknife(&fits.iter().map(|fit| fit.compliance[motor]).collect::<Vec<_>>());
         let unseen = runs.iter().zip(&without).map(|(run, fit)| squares(&fit.curves(run, motor)));
         let curves: Vec<_> = runs.iter().map(|run| fit.curves(run, motor)).collect();
@@ -121,7 +121,7 @@ pub fn gear_stiffness(runs: &[Vec<GearOutput>]) -> Option<Vec<GearEstimate>> {
             curves,
         }
     };
-    Some((0..first.torques.len()).map(of).collect())
+    Some((0..first.torques.len()).map(fitted).collect())
 }
 
 /// Returns the encoder with the largest contribution of a spring.
@@ -138,14 +138,14 @@ fn split(run: &[GearOutput]) -> [Vec<GearOutput>; 2] {
             let (a, b) = x.split_at(x.len() / 2);
             if second { b.to_vec() } else { a.to_vec() }
         };
-        let of = |output: &GearOutput| GearOutput {
+        let shortened = |output: &GearOutput| GearOutput {
             deflection: cut(&output.deflection),
             rate: cut(&output.rate),
             deflection_rate: cut(&output.deflection_rate),
             torques: output.torques.iter().map(cut).collect(),
             instruments: output.instruments.iter().map(cut).collect(),
         };
-        run.iter().map(of).collect()
+        run.iter().map(shortened).collect()
     };
     [half(false), half(true)]
 }
@@ -161,6 +161,7 @@ impl Fit {
     /// Fits runs with an offset for each encoder of each run, without one block.
     fn of(runs: &[Vec<GearOutput>], some: &[usize], without: Option<(usize, usize)>) -> Option<Self> {
         let (outputs, motors) = (runs[0].len(), runs[0][0].torques.len());
+        // Normal equations: signals less their mean in each run, compliances shared by all runs.
         let mut sums = Normal::new(motors + outputs);
         for &k in some {
             let left_out = |i: &usize| without.is_some_and(|(r, first)| r == k && (first..first + BLOCK).contains(i));
@@ -175,14 +176,16 @@ impl Fit {
                 sums.add(&columns, &centred(&output.deflection, &kept));
             }
         }
+        // The first values are compliances, the last ones delays of the outputs.
         let mut values = sums.solved(motors)?;
         let delay = values.split_off(motors);
         let mut fit = Self { compliance: values, delay, damping_s: vec![0.0; outputs] };
+        // Damping from the rest of the deflection over its rate.
         fit.damping_s = (0..outputs)
             .map(|number| {
-                let of =
+                let rests =
                     some.iter().map(|&k| (fit.rest(&runs[k][number], number), &runs[k][number].deflection_rate[..]));
-                damping_time(of)
+                damping_time(rests)
             })
             .collect();
         Some(fit)

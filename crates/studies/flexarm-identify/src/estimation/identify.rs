@@ -4,6 +4,9 @@
 //! One fit gives everything: its solution is what is reported and written. Springs are sought as
 //! compliances with a prior around zero that are not negative, so that a spring which the readings
 //! do not determine is rigid.
+//!
+//! Not here: derivatives (`sensitivity`, `response`), the least-squares solver (`least_squares`),
+//! files.
 
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
@@ -96,7 +99,7 @@ fn unknowns(parameters: &[Parameter], measurements: &Measurements) -> Vec<Unknow
     let rigid = !kind(&|kind| kind.vibrates());
     let alone = !kind(&|kind| !matches!(kind, ReadingKind::Known { .. }));
     let known = |name: &str| kind(&|kind| matches!(kind, ReadingKind::Known { parameter, .. } if parameter == name));
-    let of = |parameter: &Parameter| {
+    let unknown_of = |parameter: &Parameter| {
         let mut unknown = parameter.unknown(rigid);
         if alone {
             unknown.start = parameter.coordinate(0.0);
@@ -107,7 +110,7 @@ fn unknowns(parameters: &[Parameter], measurements: &Measurements) -> Vec<Unknow
         }
         unknown
     };
-    parameters.iter().map(of).collect()
+    parameters.iter().map(unknown_of).collect()
 }
 
 /// A measured arm as a problem in the unknowns of the fit.
@@ -128,12 +131,12 @@ impl Residuals for InUnknowns<'_> {
 
 /// Converts the parameters in `x` to search coordinates; returns the derivatives.
 fn to_search(parameters: &[Parameter], x: &mut DVector<f64>) -> Vec<f64> {
-    let of = |(parameter, x): (&Parameter, &mut f64)| {
+    let search_rate = |(parameter, x): (&Parameter, &mut f64)| {
         let (search, rate) = parameter.search(*x);
         *x = search;
         rate
     };
-    parameters.iter().zip(x.iter_mut()).map(of).collect()
+    parameters.iter().zip(x.iter_mut()).map(search_rate).collect()
 }
 
 /// Parameters, readings, and how they are fitted.
@@ -221,12 +224,12 @@ impl Fit<'_> {
     /// chance explains in some kind of readings; the largest.
     fn misfit(&self, found: &Solution) -> Option<f64> {
         let noise = self.measurements.noise();
-        let of = |kind: usize| {
+        let misfit_of = |kind: usize| {
             let own = || (0..noise.len()).filter(|k| noise[*k].kind == Some(kind));
             let rows: Vec<(f64, Noise)> = own().map(|k| (found.residuals[k], noise[k])).collect();
             misfit(&rows, own().map(|k| 1.0 - found.leverages[k]).sum(), self.search.loss)
         };
-        (0..KINDS.len()).filter_map(of).reduce(f64::max)
+        (0..KINDS.len()).filter_map(misfit_of).reduce(f64::max)
     }
 
     /// Predicts the readings of each fold from the other folds; readings at one pose are in one

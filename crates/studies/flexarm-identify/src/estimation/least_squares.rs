@@ -316,11 +316,11 @@ impl<P: Residuals> Fit<'_, P> {
 
     /// Sets the standard deviations `s` to the present errors and shares.
     fn set_deviations(&mut self) {
-        let of = |noise: &Noise| match noise.kind {
+        let deviation = |noise: &Noise| match noise.kind {
             Some(kind) => (self.shares[kind] * noise.std).hypot(self.errors[kind] * noise.size),
             None => noise.std,
         };
-        self.s = DVector::from_iterator(self.noise.len(), self.noise.iter().map(of));
+        self.s = DVector::from_iterator(self.noise.len(), self.noise.iter().map(deviation));
     }
 
     /// Estimates the errors of the model anew; returns their largest relative change.
@@ -428,14 +428,17 @@ impl<P: Residuals> Fit<'_, P> {
 
     /// Returns the solution, after checking that the rows determine what has no prior.
     fn finish(self, state: State, iterations: usize, converged: bool) -> Result<Solution, SolveError<P::Error>> {
+        // Unknowns without a prior must be determined by the rows.
         let (rows, normal) = self.normal(&state);
         let own: Vec<usize> = (0..self.unknowns.len()).filter(|k| self.unknowns[*k].prior.is_none()).collect();
         if let Some(k) = dependent(&normal.select_rows(&own).select_columns(&own)) {
             return Err(SolveError::Nuisance(own[k]));
         }
+        // Covariance of all unknowns, and with those at their bounds held.
         let covariance = inverse(&normal, |_| true).ok_or(SolveError::NotFinite)?;
         let free = inverse(&normal, |k| state.x[k] > self.unknowns[k].lower).ok_or(SolveError::NotFinite)?;
         let leverages = leverages(&rows, &free);
+        // A model error needs readings that the fit does not reproduce: Σ (1 - h) counts them.
         for kind in (0..self.errors.len()).filter(|kind| self.least[*kind] > 0.0) {
             let own = self.noise.iter().zip(leverages.iter()).filter(|(noise, _)| noise.kind == Some(kind));
             if own.map(|(_, h)| 1.0 - h).sum::<f64>() < 0.5 {
@@ -496,7 +499,7 @@ fn dependent(normal: &DMatrix<f64>) -> Option<usize> {
     None
 }
 
-/// Returns the error of the model at which residuals scatter as their deviations say; 0 if they
+/// Returns the error of the model at which residuals scatter as their deviations predict; 0 if they
 /// scatter less without it.
 ///
 /// * `freedom`: number of the residuals minus what the fit takes.

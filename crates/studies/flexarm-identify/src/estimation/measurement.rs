@@ -227,7 +227,7 @@ impl MeasuredArm<'_> {
 
     /// Returns the measured numbers in the order of [`Self::predicted`].
     pub fn observed(&self) -> Vec<f64> {
-        let of = |reading: &Reading| -> Vec<f64> {
+        let values_of = |reading: &Reading| -> Vec<f64> {
             match &reading.kind {
                 ReadingKind::Displacement { rows, .. } => rows.iter().map(|row| row.value).collect(),
                 ReadingKind::Place { rows, .. } | ReadingKind::Frequencies { rows, .. } => {
@@ -246,7 +246,7 @@ impl MeasuredArm<'_> {
                 ReadingKind::Shape(shape) => shape.unit().iter().copied().collect(),
             }
         };
-        self.measurements.readings.iter().flat_map(of).collect()
+        self.measurements.readings.iter().flat_map(values_of).collect()
     }
 
     /// Returns, for each measured mode shape, the number of its reading, the index of the most
@@ -372,11 +372,13 @@ impl MeasuredArm<'_> {
     fn instrument_at(&self, number: usize, X: &Pose, placed: bool, own: &[f64], slopes: bool) -> Block {
         let (X_IW, place, turn) = self.measurements.instrument(number, own);
         let X_WI = X_IW.inverse();
+        // Values: p_WI if the instrument is placed, then φ.
         let phi = rotation_vector((X_IW.rotation * X.rotation.inverse()).matrix());
         let p_WI = placed.then_some(X_WI.translation.vector);
         let values: Vec<f64> = p_WI.iter().flatten().chain(&phi).copied().collect();
         let mut by_own = DMatrix::zeros(values.len(), own.len());
         let rows = values.len() - 3;
+        // Derivatives with respect to the rotation: of φ, and of p_WI.
         if let Some(first) = turn {
             let rates = left_jacobian(&vector_at(own, first));
             let back = left_jacobian(&phi).try_inverse().unwrap_or_else(Matrix3::identity);
@@ -389,6 +391,7 @@ impl MeasuredArm<'_> {
                 }
             }
         }
+        // Derivatives with respect to the position.
         if let (Some(first), true) = (place, placed) {
             by_own.view_mut((0, first), (3, 3)).copy_from(&(-X_WI.rotation.matrix()));
         }

@@ -65,8 +65,8 @@ pub(crate) fn placed(nominal: &NominalArm, measurements: &Measurements) -> Resul
 fn has_all_components(kind: &ReadingKind, instrument: usize) -> bool {
     let ReadingKind::Displacement { rows, .. } = kind else { return false };
     let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
-    let of = |direction| Component { direction, instrument: Some(instrument), rotation: false };
-    rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == of(axis))
+    let component = |direction| Component { direction, instrument: Some(instrument), rotation: false };
+    rows.len() == 3 && rows.iter().zip(axes).all(|(row, axis)| row.of == component(axis))
 }
 
 /// Returns the vectors of some readings, predicted in world axes by the arm with its initial

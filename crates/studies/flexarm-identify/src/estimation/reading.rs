@@ -148,14 +148,14 @@ impl MeasuredShape {
     /// the sign of the measured ones.
     pub(crate) fn likeliest(&self, found: &StructureSlopes) -> Option<(usize, f64, DVector<f64>)> {
         let measured = self.unit();
-        let of = |j: usize| {
+        let unit_shape = |j: usize| {
             let phi = found.shapes.column(j);
             let a = DVector::from_iterator(self.probes.len(), found.structure.rows.iter().map(|row| (row * phi)[0]));
             let unit = a.try_normalize(0.0)?;
             let along = unit.dot(&measured);
             Some((j, along * along, if along < 0.0 { -unit } else { unit }))
         };
-        let all = (0..found.omega2.len()).filter_map(of);
+        let all = (0..found.omega2.len()).filter_map(unit_shape);
         all.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 }

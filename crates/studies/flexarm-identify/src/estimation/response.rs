@@ -220,7 +220,7 @@ impl Damped<'_> {
 
     /// Returns the springs with their derivatives with respect to a parameter.
     fn springs(&self, effect: &Effect) -> Vec<SpringSlope> {
-        let of = |(number, e): (usize, &ElasticElement)| {
+        let element_change = |(number, e): (usize, &ElasticElement)| {
             let mut dK = DMatrix::zeros(e.size, e.size);
             let (mut more, mut damper) = (0.0, None);
             match effect {
@@ -254,7 +254,7 @@ impl Damped<'_> {
             let first = self.plant.offset(e);
             SpringSlope { first, size: e.size, K: e.K.clone(), dK, damping: e.damping, more, damper }
         };
-        self.plant.elements.iter().enumerate().map(of).collect()
+        self.plant.elements.iter().enumerate().map(element_change).collect()
     }
 
     /// Adds the derivative of `D = Σ 2 ζ_j ω_j Mφ_j (Mφ_j)ᵀ`, where ζ_j is the mean over the
@@ -301,12 +301,12 @@ impl StructureSlopes {
     /// Computes the derivatives of a mode's shape (`mode` from 0, the lowest) with respect to each
     /// parameter's coordinate, at unit modal mass.
     pub fn shape_slopes(&self, mode: usize) -> Vec<DVector<f64>> {
-        let of = |change: &Structure| {
+        let shape_change = |change: &Structure| {
             let (S, T) =
                 (self.shapes.tr_mul(&(&change.K * &self.shapes)), self.shapes.tr_mul(&(&change.M * &self.shapes)));
             &self.shapes * shape_parts(&self.omega2, mode, &S, &T)
         };
-        self.slopes.iter().map(of).collect()
+        self.slopes.iter().map(shape_change).collect()
     }
 }
 
@@ -353,6 +353,7 @@ impl StructureSlopes {
             slopes: DMatrix::zeros(omega.len(), self.slopes.len()),
         };
         for (k, w) in omega.iter().enumerate() {
+            // Z u = b, H = factor cᵀ u
             let Z = dynamic(s, *w);
             let singular = || StepError::Singular { matrix: "dynamic stiffness (a resonance without damping)", t: 0.0 };
             let u = Z.clone().lu().solve(&b).ok_or_else(singular)?;
@@ -361,6 +362,7 @@ impl StructureSlopes {
             if self.slopes.is_empty() {
                 continue;
             }
+            // Zᵀ y = c serves all parameters: dH = factor (dcᵀ u + yᵀ db - yᵀ dZ u).
             let y = Z.transpose().lu().solve(&c).ok_or_else(singular)?;
             for (p, slope) in self.slopes.iter().enumerate() {
                 let (db, dc) = (complex(&slope.rows[hit]), complex(&slope.rows[watched]));

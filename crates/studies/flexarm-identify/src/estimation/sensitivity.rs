@@ -42,6 +42,7 @@ pub(crate) fn slopes_at_rest(
     parameters: &[Parameter],
     frame: &Frame,
 ) -> (DMatrix<f64>, Matrix6xX<f64>) {
+    // Columns of moved joint frames, then those of the other parameters.
     let (mut slopes, rigid) = frame_slopes(at, parameters, frame);
     for (k, parameter) in parameters.iter().enumerate() {
         match &parameter.effect {
@@ -253,7 +254,7 @@ pub(crate) struct Linearised {
 /// Solves the equilibrium at a pose, and computes modes and total derivatives there.
 ///
 /// ```text
-/// de/dx = -K^-1 dr/dx,   dK/dx = ∂K/∂x + ∂K/∂e de/dx,   dM/dx alike
+/// de/dx = -K^-1 dr/dx,   dK/dx = ∂K/∂x + ∂K/∂e de/dx,   dM/dx likewise
 /// ```
 /// * `more`: further matrices of the coordinates, differentiated along `de/dx`.
 ///
@@ -269,6 +270,7 @@ pub(crate) fn linearised(
     let (tool, none) = (&nominal.tool, Wrench::zeros());
     let mut at = OperatingPoint::new(plant.clone(), tool.clone());
     at.solve(q, &none)?;
+    // Forces, tangents and modes at the equilibrium.
     let forces = force_slopes(&mut at, parameters);
     let q = at.coordinates().clone();
     let here = Tangents::at(plant, tool, &none, &q);
@@ -276,6 +278,7 @@ pub(crate) fn linearised(
     let symmetric = (&here.K + here.K.transpose()) * 0.5;
     let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight)", t: 0.0 };
     let factor = symmetric.cholesky().ok_or_else(singular)?;
+    // Per parameter: change along the equilibrium, then the explicit part of K and M.
     let slopes = parameters.iter().enumerate().map(|(k, parameter)| {
         let de = -factor.solve(&forces.column(k));
         let mut change = along(plant, &q, &de, |q| {
@@ -333,6 +336,7 @@ pub fn compliance_slopes(
     let here = Tangents::at(&plant, &tool, F_T_W, &q);
     let singular = || StepError::Singular { matrix: "static stiffness (with the effect of weight and load)", t: 0.0 };
     let solve = |K: &DMatrix<f64>, B: &DMatrix<f64>| K.clone().lu().solve(B).ok_or_else(singular);
+    // U = K^-1 Jᵀ, Y = K^-T Jᵀ
     let J = DMatrix::from_fn(6, here.J.ncols(), |i, j| here.J[(i, j)]);
     let (U, Y) = (solve(&here.K, &J.transpose())?, solve(&here.K.transpose(), &J.transpose())?);
     let matrices = |q: &DVector<f64>| {
@@ -341,6 +345,7 @@ pub fn compliance_slopes(
     };
     let mut found = Vec::with_capacity(parameters.len());
     for (k, parameter) in parameters.iter().enumerate() {
+        // de/dx; J and K change along it, and K with the parameter itself.
         let moved = -solve(&here.K, &forces.columns(k, 1).into_owned())?.column(0);
         let change = along(&plant, &q, &moved, matrices);
         let (eK, _) = explicit(&plant, &tool, F_T_W, &parameter.effect, &q, &here);

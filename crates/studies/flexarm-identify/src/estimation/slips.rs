@@ -148,11 +148,13 @@ fn best_order(
     slides: &[bool],
 ) -> (Vec<usize>, f64) {
     let n = as_said.len();
+    // Only joints of one kind can be exchanged.
     let alike = |order: &[usize]| order.iter().enumerate().all(|(k, from)| slides[k] == slides[*from]);
     let scored = |order: Vec<usize>| alike(&order).then(|| rest(&order).map(|rest| (order, rest))).flatten();
     let others = (1..n).map(|by| (0..n).map(|k| (k + by) % n).collect()).chain([(0..n).rev().collect()]);
     let begins = others.filter_map(scored).chain([(as_said, before)]);
     let least = |a: &(Vec<usize>, f64), b: &(Vec<usize>, f64)| a.1.total_cmp(&b.1);
+    // From each start, make the best exchange until none reduces the residual.
     let climbed = begins.map(|mut best| {
         loop {
             let exchanged = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).filter_map(|(i, j)| {
@@ -240,11 +242,12 @@ fn place_rest(nominal: &NominalArm, measurements: &Measurements) -> Option<f64> 
                 matches!(measurements.readings[*k].kind, ReadingKind::Place { instrument, .. } if instrument == number)
             })
             .collect();
-        let of = |all: &[Vector3<f64>]| own.iter().map(|k| all[*k]).collect::<Vec<_>>();
-        let (p, q) = (of(&predicted), of(&measured));
+        let chosen = |all: &[Vector3<f64>]| own.iter().map(|k| all[*k]).collect::<Vec<_>>();
+        let (p, q) = (chosen(&predicted), chosen(&measured));
         if q.len() < 5 {
             continue;
         }
+        // Pose of the instrument that fits its readings best.
         let X = rigid_fit(&p, &q)?;
         let mean = q.iter().sum::<Vector3<f64>>() / q.len() as f64;
         for (p, q) in p.iter().zip(&q) {

@@ -2,6 +2,8 @@
 //!
 //! A row of a table replaces what the entry says for all rows. Values are along a direction or along
 //! the axes x, y, z of the world or of an instrument; empty cells are not measured.
+//!
+//! Not here: other kinds of readings, recordings over time (`recording.rs`).
 
 use std::path::{Path, PathBuf};
 

@@ -44,8 +44,8 @@ impl Reader<'_> {
             return Err(self.error(relative, "std (Hz) and std_relative (part of each frequency): keep one of them"));
         }
         let (std, relative) = (self.std(located(&e.std), 1.0)?, self.std(located(&e.std_relative), 1.0)?);
-        let of = |f: f64| if e.std_relative.is_some() { relative * f } else { std };
-        let rows = hz.iter().zip(modes).map(|(f, mode)| Row { of: mode - 1, value: *f, std: of(*f) }).collect();
+        let std_of = |f: f64| if e.std_relative.is_some() { relative * f } else { std };
+        let rows = hz.iter().zip(modes).map(|(f, mode)| Row { of: mode - 1, value: *f, std: std_of(*f) }).collect();
         let kind = ReadingKind::Frequencies { load: self.load(&e.load, &site)?, rows };
         let q = self.joints(&e.joints)?;
         self.measurements.readings.push(Reading { name: format!("frequency {}", number + 1), q, kind });

@@ -121,6 +121,7 @@ impl Reader<'_> {
     /// Reads a recording, and converts the motors of coupled gears to joint positions.
     pub(super) fn encoders(&self, entry: &Spanned<EncodersEntry>) -> Result<EncoderRecording, Error> {
         let e = entry.get_ref();
+        // The table, at equal intervals of time.
         let path = named_file("file", e.file.get_ref(), self.folder).map_err(|message| self.error(&e.file, message))?;
         let table = RecordingTable { reader: self, table: NumberTable::read(&path)?, path };
         let time = table.column(e.time.get_ref(), Site::from(&e.time))?;
@@ -129,6 +130,7 @@ impl Reader<'_> {
             let text = format!("the times of {path} are not evenly spaced, or there are fewer than three");
             self.error(&e.time, text)
         })?;
+        // Encoders on both sides of the gears, and torques.
         let Units { length, angle, force } = self.units;
         let link = table.joints(&e.link, false, [angle, length])?;
         if link.iter().all(Option::is_none) {

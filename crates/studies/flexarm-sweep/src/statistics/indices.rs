@@ -79,7 +79,7 @@ fn estimate(bases: &[&[f64]], rows: &[usize], dimensions: usize) -> Option<Vec<[
     if variance <= 1e-24 * mean * mean || variance == 0.0 {
         return None;
     }
-    let of = |i: usize| {
+    let indices_of = |i: usize| {
         let (mut first, mut total) = (0.0, 0.0);
         for k in rows {
             let base = bases[*k];
@@ -89,7 +89,7 @@ fn estimate(bases: &[&[f64]], rows: &[usize], dimensions: usize) -> Option<Vec<[
         }
         [first / n / variance, total / (2.0 * n) / variance]
     };
-    Some((0..dimensions).map(of).collect())
+    Some((0..dimensions).map(indices_of).collect())
 }
 
 /// Returns a quantile of sorted values by linear interpolation; NaN without values.

@@ -67,20 +67,21 @@ impl Workshop {
         let RunInputs { robot, motion, loads, options, given, speed } = self.chosen(values)?;
         let mut changes = self.changes(values, &robot, motion.as_deref(), loads.as_deref())?;
         self.reduce_again(&robot, &mut changes)?;
-        let of = |which: TargetFile| changes.get(&which).map_or(&[][..], Vec::as_slice);
-        let moves = of(TargetFile::Robot).iter().any(|edit| {
+        let edits = |which: TargetFile| changes.get(&which).map_or(&[][..], Vec::as_slice);
+        let moves = edits(TargetFile::Robot).iter().any(|edit| {
             let first = segments(&edit.place.name).and_then(|path| path.into_iter().next());
             first.is_none_or(|first| !matches!(first, Segment::Key(key) if NOT_OF_THE_MOTION.contains(&key.as_str())))
         });
-        let text = self.changed(&robot, of(TargetFile::Robot));
+        let text = self.changed(&robot, edits(TargetFile::Robot));
         let files = RunFiles {
             robot: (robot, text),
             motion: motion.map(|path| {
-                let text = (!of(TargetFile::Motion).is_empty()).then(|| self.changed(&path, of(TargetFile::Motion)));
+                let text =
+                    (!edits(TargetFile::Motion).is_empty()).then(|| self.changed(&path, edits(TargetFile::Motion)));
                 (path, text)
             }),
             loads: loads.map(|path| {
-                let text = self.changed(&path, of(TargetFile::Loads));
+                let text = self.changed(&path, edits(TargetFile::Loads));
                 (path, text)
             }),
             options: given,

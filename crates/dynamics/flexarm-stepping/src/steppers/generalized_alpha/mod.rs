@@ -37,6 +37,8 @@
 //! also renews the matrix. A step may end anywhere before the next multiple of h
 //! ([`Integrator::advance_to`]). A step whose iteration fails is repeated with a matrix computed at
 //! its start, then in halves, down to `h/64`; afterwards the grid of multiples of h continues.
+//!
+//! Not here: Newton's iteration (`implicit.rs`) and its matrix (`iteration_matrix.rs`).
 
 mod dispersion;
 

@@ -28,6 +28,8 @@ fn is_dependent(model: &Model, body: usize) -> bool {
     model.loops().iter().any(|own| own.dependent.contains(&body))
 }
 
+/// Compliance `Σ` of the rows of a joint for the step size h (s): that of its spring, or almost
+/// zero.
 pub(super) fn joint_compliance(plant: &Plant, body: usize, h: f64, preset: SpookPreset) -> JointCompliance {
     let element = plant.elements.iter().position(|e| e.body == body);
     let upsilon = match (preset, element) {

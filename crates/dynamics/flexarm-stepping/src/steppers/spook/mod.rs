@@ -20,6 +20,8 @@
 //! Frames: P, Q proximal and distal face of a joint, P = Q when undeformed. [`constraint`] contains
 //! the rows, [`solve`] the elimination, [`pins`] the closure of loops, [`observe`] what a run
 //! reports. Source: [Lacoursière 2007]; theory page, section 4.
+//!
+//! Not here: elimination of the rows (`solve`), joint rows (`constraint`), pins of loops (`pins`).
 
 mod checks;
 mod compliance;
@@ -421,11 +423,13 @@ impl Spook {
         let BalancerPlace::Joint { terms, offset, .. } = &balancer.place else { return 0.0 };
         let model = &self.plant.model;
         let coordinate = |k: usize| {
-            let of = &model.coordinates()[k];
-            match model.bodies()[of.body].motion {
+            let joint = &model.coordinates()[k];
+            match model.bodies()[joint.body].motion {
                 _ if k < model.n_actuated() => self.now.q[k],
-                JointMotion::Axis(motion) => motion.coordinate_of(&self.deflection_now(of.body, Default::default()).0),
-                JointMotion::Elastic(angles) => self.deflection_now(of.body, angles).0[of.component],
+                JointMotion::Axis(motion) => {
+                    motion.coordinate_of(&self.deflection_now(joint.body, Default::default()).0)
+                }
+                JointMotion::Elastic(angles) => self.deflection_now(joint.body, angles).0[joint.component],
                 JointMotion::Interface { .. } | JointMotion::Welded => 0.0,
             }
         };

@@ -27,6 +27,7 @@ impl Spook {
         let element = || self.plant.elements.iter().position(|element| element.body == i);
         match body.motion {
             JointMotion::Axis(motion) if body.elastic => {
+                // Spring of a drive: one coordinate, load -K (e + τ ė).
                 let (g, rate) = self.deflection_now(i, Default::default());
                 let (e, rate) = (motion.coordinate_of(&g), motion.coordinate_of(&rate));
                 out.q[body.coordinate] = e;
@@ -37,11 +38,13 @@ impl Spook {
                 }
             }
             JointMotion::Axis(_) if body.coordinate < out.drive.len() => {
+                // Drive: component of the joint force along its axis.
                 out.drive[body.coordinate] = self.rows[i].S.dot(&force);
             }
             JointMotion::Axis(_) => {}
             JointMotion::Interface { .. } | JointMotion::Welded => {}
             JointMotion::Elastic(angles) => {
+                // Elastic joint of a link: six coordinates, load -K (e + τ ė).
                 let (g, rate) = self.deflection_now(i, angles);
                 out.q.fixed_rows_mut::<6>(body.coordinate).copy_from(&g);
                 out.qdot.fixed_rows_mut::<6>(body.coordinate).copy_from(&rate);

@@ -207,7 +207,7 @@ pub enum Jacobian {
 }
 
 impl Jacobian {
-    /// Returns `G_p v` for the twist of the parent in world axes.
+    /// Returns `G_p v` for the twist of the parent in world axes (m/s, rad/s).
     #[inline]
     pub fn of_parent(&self, v: &Vector6<f64>) -> Vector6<f64> {
         match self {

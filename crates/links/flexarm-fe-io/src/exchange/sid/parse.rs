@@ -49,12 +49,14 @@ struct Cursor<'a, I: Iterator<Item = Line<'a>>> {
 pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, FeFileError> {
     let text = Text::new(text, origin);
     let mut lines = text.lines();
+    // First line: numbers of nodes and modes, and a comment.
     let (place, first) = lines.next().unwrap_or((text.file(), ""));
     let (numbers, comment) = first.split_once(':').unwrap_or((first, ""));
     let mut numbers = words(numbers);
     let nodes = place.integer("number of nodes", numbers.next().unwrap_or(""))?;
     let modes = place.integer("number of modes", numbers.next().unwrap_or(""))?;
 
+    // Further lines are `key = value`, or a key alone.
     let lines = lines.map(|(place, line)| match line.split_once('=') {
         Some((key, value)) => (place, key.trim(), Some(value.trim())),
         None => (place, line.trim(), None),
@@ -64,6 +66,7 @@ pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, FeFileError> {
     let mut cursor = Cursor { lines: lines.peekable(), origin, most_entries };
     cursor.expect("part")?;
     cursor.expect("new modal")?;
+    // Parts in their fixed order; their sizes must agree with the first line.
     let mut sid = Sid { comment: comment.to_owned(), ..Sid::default() };
     cursor.refmod(&mut sid)?;
     cursor.frame(&mut sid)?;
@@ -135,6 +138,7 @@ impl<'a, I: Iterator<Item = Line<'a>>> Cursor<'a, I> {
         Ok(())
     }
 
+    /// Parses a node up to `end node`; nq modes.
     fn node(&mut self, place: ErrorPosition<'a>, id: i64, nq: usize) -> Result<SidNode, FeFileError> {
         let mut rframe = String::new();
         let mut found: [Option<SidMatrix>; 5] = Default::default();

@@ -65,7 +65,9 @@ impl GroupNodes {
 }
 
 impl Collector {
-    /// `keep_lines`: whether line elements may be beams.
+    /// Creates an empty collector.
+    ///
+    /// * `keep_lines`: whether line elements may be beams.
     pub fn new(keep_lines: bool) -> Self {
         Self {
             draft: Draft::default(),

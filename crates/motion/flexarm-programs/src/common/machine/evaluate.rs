@@ -76,6 +76,7 @@ impl<D: Dialect> Machine<'_, D> {
         Ok(Value::Pose(pose))
     }
 
+    /// Returns the element of a list or pose at an index, which starts as in the language.
     fn element(&mut self, value: Value, base: &Expr, at: Value, span: Span) -> Result<Value> {
         if let Value::Outside(what) = at {
             return Ok(Value::Outside(what));

@@ -6,7 +6,7 @@
 
 use std::collections::HashMap;
 
-use mcap::records::Record;
+use mcap::records::{MessageHeader, Record};
 
 use super::frames::{Frames, pose};
 use crate::mcap_file::channels::topic_names;
@@ -176,28 +176,32 @@ impl Assembly {
                 }
                 Ok(false)
             }
-            Record::Message { header, data } => {
-                let Some(&(topic, form)) = self.channels.get(&header.channel_id) else { return Ok(false) };
-                let next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
-                // Frames precede the rest of their sample and have their own sequence numbers.
-                // Those of the last sample may follow it.
-                let of_next = topic == Topic::Frames && self.log_time != header.log_time;
-                let closed = (next || of_next) && self.close();
-                if next {
-                    (self.sequence, self.log_time) = (Some(header.sequence), header.log_time);
-                    let time_ns = header.log_time.saturating_sub(self.epoch_ns);
-                    (self.sample.time_s, self.sample.step) = exact_time(time_ns, self.step_s);
-                }
-                if self.message(topic, form, data).is_none() {
-                    return Err(UnreadableMessage { topic, log_time_ns: header.log_time });
-                }
-                if topic.is_of_a_sample() {
-                    self.topics.push(topic);
-                }
-                Ok(closed)
-            }
+            Record::Message { header, data } => self.take_message(header, data),
             _ => Ok(false),
         }
+    }
+
+    /// Takes a message. Returns as [`Assembly::take`].
+    fn take_message(&mut self, header: &MessageHeader, data: &[u8]) -> Result<bool, UnreadableMessage> {
+        let Some(&(topic, form)) = self.channels.get(&header.channel_id) else { return Ok(false) };
+        // Frames precede the rest of their sample and have their own sequence numbers. Those of the
+        // last sample may follow it.
+        let is_next = topic.is_of_a_sample() && self.sequence != Some(header.sequence);
+        let is_frame_of_next = topic == Topic::Frames && self.log_time != header.log_time;
+        let closed = (is_next || is_frame_of_next) && self.close();
+        if is_next {
+            (self.sequence, self.log_time) = (Some(header.sequence), header.log_time);
+            let time_ns = header.log_time.saturating_sub(self.epoch_ns);
+            (self.sample.time_s, self.sample.step) = exact_time(time_ns, self.step_s);
+        }
+        // The values of the message.
+        if self.message(topic, form, data).is_none() {
+            return Err(UnreadableMessage { topic, log_time_ns: header.log_time });
+        }
+        if topic.is_of_a_sample() {
+            self.topics.push(topic);
+        }
+        Ok(closed)
     }
 
     /// Completes the current sample; returns whether there was one.

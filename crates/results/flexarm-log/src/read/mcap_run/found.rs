@@ -37,6 +37,8 @@ pub(super) struct FileContents {
 }
 
 impl FileContents {
+    /// Takes what a record says about the whole recording; counts the samples by the messages of
+    /// `/tf`.
     pub(super) fn take(&mut self, record: Record<'_>) {
         match record {
             Record::Header(header) => self.library = header.library,
@@ -47,6 +49,7 @@ impl FileContents {
             Record::Metadata(group) => self.metadata.push((group.name, group.metadata)),
             Record::Attachment { header, data, .. } => {
                 let bytes = data.into_owned();
+                // Files that a run has by name; the first of each counts.
                 let own = match header.name.as_str() {
                     RUN_JSON => Some(&mut self.run),
                     RESULT_JSON => Some(&mut self.result),

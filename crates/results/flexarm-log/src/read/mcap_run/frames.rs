@@ -35,6 +35,7 @@ enum FrameOwner {
 }
 
 impl Frames {
+    /// Prepares the poses of all frames that the header names.
     pub(super) fn of(header: &RunHeader) -> Self {
         let mut places = HashMap::new();
         for (link, info) in header.links.iter().enumerate() {
@@ -43,6 +44,7 @@ impl Frames {
                 places.insert(format!("rigid/{}", info.name), FrameOwner::Link { twin: 1, link });
             }
         }
+        // Stations of the bends, in the order of the header.
         let mut X_LS = Vec::new();
         for bend in &header.bends {
             let link = &header.links[bend.link].name;

@@ -248,6 +248,7 @@ pub(super) fn percent(format: &str, values: &Value) -> Result<Value, ExpressionE
             rest = after;
             continue;
         }
+        // A conversion ends with its letter.
         let end = rest.find(|c: char| c.is_ascii_alphabetic());
         let end = end.ok_or_else(|| ExpressionError::new("a % in a format has no letter behind it"))?;
         let value =

@@ -125,6 +125,7 @@ fn string(text: &str, prefix: usize, raw: bool) -> Result<(Token, usize), Expres
         }
         let Some(escaped) = body[at..].chars().next() else { break };
         at += escaped.len_utf8();
+        // Unknown escapes stay as written, as in Python.
         match escaped {
             _ if raw => out.extend(['\\', escaped]),
             'n' => out.push('\n'),

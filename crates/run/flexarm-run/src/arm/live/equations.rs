@@ -130,6 +130,7 @@ impl Equations {
         let plant = self.plants.carrying(*payload)?;
         let model = &self.arm.model;
         let names: Vec<&str> = model.coordinates()[..model.n_actuated()].iter().map(|c| c.joint.as_str()).collect();
+        // Check the command and the state before anything changes.
         for values in [q, qdot, qddot, torque] {
             joint_values(Some(values), &names)?;
         }
@@ -142,6 +143,7 @@ impl Equations {
                 return Err(Error::not_finite(what, found));
             }
         }
+        // Hand the command to the motion, the load, the plant and the drives.
         {
             let mut given = self.given.0.write().unwrap_or_else(PoisonError::into_inner);
             given.iter_mut().zip([q, qdot, qddot]).for_each(|(to, from)| to.copy_from_slice(from));

@@ -6,6 +6,9 @@
 //! they follow the parabola through the last three targets, whose acceleration lags by one period,
 //! as in any controller that receives positions only. Drives respond as in a run: prescribed joints
 //! follow exactly, servos with their gains and lag.
+//!
+//! Not here: equations of motion for integrators of others (`equations.rs`), sensors
+//! (`readings.rs`).
 
 mod equations;
 mod readings;

@@ -375,11 +375,11 @@ impl Reader<'_> {
             let p = Vector3::new(point[0], point[1], point[2]) * self.units.length;
             let X_BT = Pose::from_parts(Translation3::from(p), turned);
             let to = Target::Pose { X_BT, configuration: Configuration::NEAREST };
-            let mut of = self.of(table, &format!("spline through {point:?}"), MoveKind::Spline, to);
+            let mut piece = self.of(table, &format!("spline through {point:?}"), MoveKind::Spline, to);
             if k + 1 < n {
-                of.blend = Blend::Pass;
+                piece.blend = Blend::Pass;
             }
-            items.push(Item::Move(of));
+            items.push(Item::Move(piece));
         }
         Ok(())
     }

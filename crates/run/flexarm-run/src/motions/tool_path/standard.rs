@@ -68,6 +68,7 @@ impl Standard {
                 // The square P2 to P5, then the large and the small circle in the test plane.
                 Self::Iso9283Paths => {
                     steps.extend(corners.iter().chain([&corners[0]]).map(|p| line(*p)));
+                    // Two circles about the centre, in the plane of the corners.
                     let (u, v) = (Vector3::y(), Vector3::new(1.0, 0.0, -1.0).normalize());
                     for part in [LARGE, SMALL] {
                         steps.extend(circle(centre, 0.5 * part * side, u, v, &pose));
@@ -75,6 +76,7 @@ impl Standard {
                 }
                 // Circles in the three coordinate planes, each in both directions.
                 Self::Circularity => {
+                    // A circle in each coordinate plane, in both senses.
                     let (x, y, z) = (Vector3::x(), Vector3::y(), Vector3::z());
                     for (u, v) in [(x, y), (y, z), (z, x)] {
                         steps.extend(circle(centre, 0.5 * side, u, v, &pose));
@@ -83,6 +85,7 @@ impl Standard {
                 }
                 // Both ends of a stroke along each axis, with a rest at each.
                 Self::Settle => {
+                    // To both sides of the centre along each axis.
                     for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
                         for p in [centre + axis * (0.5 * side), centre - axis * (0.5 * side)] {
                             steps.extend([line(p), Step::Rest(REST)]);

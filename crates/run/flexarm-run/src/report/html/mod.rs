@@ -90,9 +90,9 @@ fn body(main: &ReportRun<'_>, runs: &[ReportRun<'_>], arm: &str, thinning: &str)
     body += "<section id=\"plots\"><noscript><p>The plots need JavaScript.</p></noscript></section>\n";
     body += thinning;
     body += &iso_table(runs);
-    let of = if runs.len() > 1 { format!(" of {}", markup(main.label)) } else { String::new() };
-    body += &stops_table(main.summary, &of);
-    body += &parts_tables(main.summary, &of);
+    let suffix = if runs.len() > 1 { format!(" of {}", markup(main.label)) } else { String::new() };
+    body += &stops_table(main.summary, &suffix);
+    body += &parts_tables(main.summary, &suffix);
     let inputs: String = runs.iter().map(|run| inputs(run, runs.len() > 1)).collect();
     if !inputs.is_empty() {
         let _ = write!(body, "<div id=\"inputs\">\n{inputs}</div>\n");

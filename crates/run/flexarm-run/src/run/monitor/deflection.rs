@@ -14,7 +14,9 @@ pub struct Deflections {
 }
 
 impl Deflections {
-    /// `n_drives`: number of drives of the robot.
+    /// Creates the monitor.
+    ///
+    /// * `n_drives`: number of drives of the robot.
     pub fn new(plant: &Plant, arm: &Arm, n_drives: usize) -> Self {
         let springs = plant.elements.iter().zip(&arm.owners).filter_map(|(element, owner)| match owner {
             // The translations of several springs do not count.
@@ -29,7 +31,9 @@ impl Deflections {
         Self { springs: springs.collect(), largest: vec![0.0; n_drives] }
     }
 
-    /// `q`: all coordinates of the model.
+    /// Takes a sample.
+    ///
+    /// * `q`: all coordinates of the model (rad or m).
     pub fn update(&mut self, q: &DVector<f64>) {
         for &(first, size, drive) in &self.springs {
             let e = q.rows(first, size);

@@ -17,7 +17,9 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// `model`: that of the arm at the start.
+    /// Creates the monitor.
+    ///
+    /// * `model`: tree of the arm at the start.
     pub fn new(model: &Arc<Model>) -> Self {
         Self { model: model.clone(), book: EnergyBook::default() }
     }
@@ -32,6 +34,7 @@ impl Energy {
             }
             self.model.clone_from(&observed.model);
         }
+        // Power of each drive, force times velocity; hysteresis is known only as work.
         let drives = observed.drive.iter().zip(observed.qdot.iter()).map(|(force, rate)| force * rate);
         self.book.lose(observed.hysteresis_work);
         self.book.add(observed.t, observed.energy, observed.power, observed.impulse_work, drives);

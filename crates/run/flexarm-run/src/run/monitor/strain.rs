@@ -2,9 +2,10 @@
 //! small deformations, and no stiffening by centrifugal forces.
 //!
 //! ```text
-//! ε = (|p_AB| - l)/l        θ = |log((R_AB undeformed)ᵀ R_AB)|
+//! ε = (|p_AE| - l)/l        θ = |log((R_AE undeformed)ᵀ R_AE)|
 //! ```
-//! A, B: interfaces of the link; l: their distance.
+//! A, E: near and far interface of the link; l: their distance (m); W: world. Not here: strain inside
+//! the link, which the stress monitor has (`stress`).
 
 use flexarm_analysis::engineering_strain;
 use flexarm_kinematics::{Frame, Model, Pose, rotation_vector};
@@ -59,7 +60,9 @@ pub struct Strains {
 }
 
 impl Strains {
-    /// `model`: tree of the flexible robot.
+    /// Creates the monitor.
+    ///
+    /// * `model`: tree of the flexible robot.
     pub fn new(arm: &Arm, model: &Model) -> Self {
         let frame = |name: &str| model.frame(name).expect("a link of the substitution");
         let spans = arm.spans.iter().map(|span| Span {
@@ -72,6 +75,8 @@ impl Strains {
         Self { spans: spans.collect(), largest: vec![LinkStrain::default(); arm.spans.len()] }
     }
 
+    /// Takes a sample.
+    ///
     /// * `X_WB`: poses of all bodies in the world at time t (s); `rigid`: those of the rigid twin,
     ///   whose links are undeformed.
     pub fn update(&mut self, t: f64, X_WB: &[Pose], rigid: &[Pose]) {

@@ -114,6 +114,8 @@ impl ToolPathMonitor {
         }
     }
 
+    /// Takes a sample at t (s).
+    ///
     /// * `velocity`: of the rigid TCP (m/s, world axes).
     pub fn update(&mut self, t: f64, tool: &ToolError, velocity: &Vector3<f64>) {
         let moves = &self.path.moves;
@@ -171,6 +173,7 @@ impl ToolPathMonitor {
         let peak = self.sums.iter().max_by(|a, b| a.peak.total_cmp(&b.peak)).filter(|_| samples > 0)?;
         let squares: f64 = self.sums.iter().map(|sums| sums.squares).sum();
         let rms = |squares: f64, samples: usize| (squares / samples.max(1) as f64).sqrt();
+        // Figures of a move, then those of all moves together.
         let figures = |(of, sums): (&flexarm_path::PlannedMove, &Sums)| PathMoveFigures {
             line: of.place.line.unwrap_or(0),
             statement: of.statement.clone(),

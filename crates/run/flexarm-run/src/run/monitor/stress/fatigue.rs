@@ -34,6 +34,7 @@ impl LinkStress {
             let worst = FatigueCycle { range, mean, count: 0.5 * samples as f64 };
             Some((k, self.strength_at(k)?.curve()?.damage(&[worst])))
         };
+        // Exact damage in the order of the bounds.
         let mut bounds: Vec<(usize, f64)> = self.judged().into_iter().filter_map(bound).collect();
         bounds.sort_by(|a, b| b.1.total_cmp(&a.1));
         let mut most: Option<(usize, f64)> = None;

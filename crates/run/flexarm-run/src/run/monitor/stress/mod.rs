@@ -207,6 +207,7 @@ impl StressMonitor {
                 place: link.place(gauge.site, &amplitudes, &self.times),
             });
             let strain = |gauge: &PlacedGauge| {
+                // Strain history: row of the gauge times the stress (Voigt) of its site.
                 let by = RowSVector::<f32, 6>::from(gauge.strain?.map(|by| by as f32));
                 let history = by * link.map.stress().fixed_rows::<6>(6 * gauge.site) * &amplitudes;
                 let site = &link.fields.sites[gauge.site];
@@ -232,6 +233,7 @@ impl StressMonitor {
     pub(crate) fn scenery(&self) -> Vec<Scenery> {
         let links = || self.links.iter().filter(|_| !self.times.is_empty()).map(|link| (link, link.worst()));
         let worst = |(link, worst): &(&LinkStress, Vec<usize>)| worst.first().map_or(0.0, |k| link.peak(*k));
+        // The link with the largest stress gives the scale of the colours and the instant.
         let Some(first) = links().max_by(|a, b| worst(a).total_cmp(&worst(b))) else { return Vec::new() };
         let scale = f64::from(worst(&first)).max(f64::MIN_POSITIVE);
         let Some(sample) = first.1.first().map(|k| first.0.time_of_peak(*k)) else { return Vec::new() };
@@ -242,6 +244,7 @@ impl StressMonitor {
                 let [r, g, b] = magnitude((f64::from(stress) / scale).min(1.0));
                 [r, g, b, 255]
             };
+            // Surface coloured by stress, and labels at the worst places.
             let surface = SceneryForm::Surface {
                 places: (0..link.fields.sites.len()).map(place).collect(),
                 triangles: link.fields.triangles.clone(),
@@ -327,6 +330,7 @@ fn fields_and_map(
     elements: &[&ElasticElement],
     modelling: &Modelling,
 ) -> Result<Option<(Arc<StressFields>, StressMap)>, Error> {
+    // Stress fields: from the file of a mesh link, or from the formulas of a beam.
     let (fields, path) = match (&link.stress, &link.beam, &span.lumped) {
         (Some(StressSource::File { path, fields }), ..) => (fields.clone(), path),
         (Some(StressSource::Beam), Some(beam), Some(lumped)) => {
@@ -336,6 +340,7 @@ fn fields_and_map(
         }
         _ => return Ok(None),
     };
+    // Map from elastic coordinates of a chain, or from modal coordinates.
     let map = match &span.lumped {
         Some(Chain { joints, parts }) => {
             let spring = |element: &&ElasticElement| Matrix6::from_fn(|i, j| element.K[(i, j)]);
