@@ -1,8 +1,9 @@
 //! Spatial algebra: poses, twists, wrenches, inertias and rotations for the other crates.
 //!
 //! Frames are denoted by letters: `X_AB` is the pose of frame B in frame A, `p_A = X_AB p_B`.
-//! Six-vectors have the linear part first; SI units. A twist or wrench refers to a point and to axes:
-//! [`Twist::at_parent`] and [`Wrench::at_parent`] transform them to another frame of the same body.
+//! Six-vectors have the linear part first; SI units. A twist or wrench refers to a point and to
+//! axes: [`Twist::at_parent`] and [`Wrench::at_parent`] transform them to another frame of the same
+//! body.
 //!
 //! ```
 //! use flexarm_spatial::{Pose, Twist, Wrench, adjoint};

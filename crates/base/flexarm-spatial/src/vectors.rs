@@ -119,7 +119,8 @@ pair_algebra!(Wrench, force, torque);
 impl<T: Real> Twist<T> {
     /// Power `V_Aᵀ F_A` of a wrench on a body that moves with this twist, W.
     ///
-    /// * `F`: at the same point and in the same axes as the twist. The power does not depend on them.
+    /// * `F`: at the same point and in the same axes as the twist. The power does not depend on
+    ///   them.
     #[inline(always)]
     pub fn power(&self, F: &Wrench<T>) -> T {
         dot(&self.linear, &F.force) + dot(&self.angular, &F.torque)
@@ -143,8 +144,8 @@ impl<T: Real> Twist<T> {
         Twist::new(add(&cross(w, &U.linear), &cross(v, &U.angular)), cross(w, &U.angular))
     }
 
-    /// Force cross product `V ×* F`: time derivative of a wrench (or momentum) `F` that is fixed to a
-    /// body moving with `V`.
+    /// Force cross product `V ×* F`: time derivative of a wrench (or momentum) `F` that is fixed to
+    /// a body moving with `V`.
     ///
     /// ```text
     /// V ×* F = [w × f; w × t + v × f]      V = [v; w],   F = [f; t]
@@ -410,7 +411,8 @@ impl ArticulatedInertia {
     /// Articulated inertia about Ao in A axes, `Ad_BAᵀ I Ad_BA`.
     ///
     /// ```text
-    /// A' = R A Rᵀ,   B' = R B Rᵀ - A' [p]x,   C' = R C Rᵀ + [p]x B' - (R B Rᵀ)ᵀ [p]x,   p = p_AoBo_A
+    /// A' = R A Rᵀ,   B' = R B Rᵀ - A' [p]x      R = R_AB,   p = p_AoBo_A
+    /// C' = R C Rᵀ + [p]x B' - (R B Rᵀ)ᵀ [p]x
     /// ```
     /// * `X_AB`: pose of B in A, m.
     #[inline(always)]

@@ -152,7 +152,8 @@ pub fn link_from_superelement(
             halves_of_bar(&whole, &frames.p_AB())
         }
     };
-    // The link, which passes the gate here; then frequencies and masses are compared with the matrices.
+    // The link, which passes the gate here; then frequencies and masses are compared with the
+    // matrices.
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
     let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
     if has_mass && held_frequencies_hz.is_empty() {

@@ -140,7 +140,8 @@ impl Open {
     /// flanges.
     ///
     /// ```text
-    /// J = 2/3 b t_f³ + 1/3 (h - 2 t_f) t_w³ + 2 α D⁴ - 0.420 t_f⁴       D: largest circle inscribed in a junction
+    /// J = 2/3 b t_f³ + 1/3 (h - 2 t_f) t_w³ + 2 α D⁴ - 0.420 t_f⁴
+    /// D: diameter of the largest circle inscribed in a junction
     /// ```
     ///
     /// # Source

@@ -166,17 +166,20 @@ impl ReducedLink {
         self.proximal.mass + self.distal.mass
     }
 
-    /// Both parts merged into one rigid body, for the rigid reference model.
+    /// Both parts merged into one rigid body, link axes, for the rigid reference model.
     pub fn rigid(&self) -> RigidPart {
         self.proximal.merged(&self.distal)
     }
 
-    /// Vector from A to B, link axes, m.
+    /// Vector `p_AoBo_L` from A to B, link axes, m.
     pub fn p_AB(&self) -> Vector3<f64> {
         self.frames().p_AB()
     }
 
-    /// Compliance `C_BB = K_BB⁻¹` at Bo with A clamped, link axes.
+    /// Compliance of the distal interface with A clamped, `u_B = C_BB F_B`.
+    ///
+    /// Returns `C_BB = K_BB⁻¹`, 6×6 (m/N, m/(N·m); rad/N, rad/(N·m)), at Bo, link axes, exactly
+    /// symmetric.
     ///
     /// # Errors
     /// [`FemError::NotPositiveDefinite`] if the caller has changed `K_BB` into a singular matrix.
@@ -195,7 +198,14 @@ impl ReducedLink {
         })
     }
 
-    /// Stiffness of both interfaces, 12×12, A then B, link axes, for export to FE programs.
+    /// Stiffness of both interfaces, for export to FE programs.
+    ///
+    /// ```text
+    /// K = [ Adᵀ K_BB Ad   -Adᵀ K_BB ]      F = K [u_A; u_B],   Ad = Ad_BA
+    ///     [  -K_BB Ad        K_BB   ]
+    /// ```
+    /// Returns K, 12×12 (N/m, N/rad; N·m/m, N·m/rad), at Ao and Bo, link axes, exactly symmetric.
+    /// Its null space is the six rigid motions.
     pub fn matrix12(&self) -> Matrix12 {
         let Ad_BA = lever(&self.p_AB());
         let K_AB = -Ad_BA.transpose() * self.K_BB;
@@ -233,8 +243,11 @@ impl ReducedLink {
 
     /// Moves the elastic joint to another frame. The cut between the parts is unchanged.
     ///
+    /// * `X_LS`: pose of the new split frame in the link frame, m.
+    ///
     /// # Errors
-    /// Errors of [`stiffness_at_split`].
+    /// Errors of [`stiffness_at_split`]; [`FemError::OutOfRange`] for a frame more than 100 m from
+    /// the link origin.
     pub fn with_split(&self, X_LS: Pose) -> Result<Self, FemError> {
         let frames = self.frames().with_split(X_LS);
         frames.check()?;
@@ -288,6 +301,10 @@ pub fn stiffness_at_split(K_BB: &Matrix6<f64>, X_BS: &Pose) -> Result<Matrix6<f6
 /// Diagonal of `K_S`: six separate springs, as in plain spring models.
 ///
 /// Wrong by tens of per cent where `K_S` is coupled; only for demonstrating that error.
+///
+/// * `K_S`: 6×6 (N/m, N/rad; N·m/m, N·m/rad), at So, in S axes.
+///
+/// Returns a diagonal 6×6 matrix at the same point, in the same axes.
 pub fn drop_coupling(K_S: &Matrix6<f64>) -> Matrix6<f64> {
     Matrix6::from_diagonal(&K_S.diagonal())
 }

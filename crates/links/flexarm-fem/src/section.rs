@@ -8,8 +8,8 @@
 //!
 //! Start at [`Section::bar`]; [`Section::properties`] is the purely geometric step.
 //!
-//! Not here: I-beams and channels (`open_section`), stress on the outline (`section_outline`), the element
-//! ([`crate::beam`]).
+//! Not here: I-beams and channels (`open_section`), stress on the outline (`section_outline`), the
+//! element ([`crate::beam`]).
 
 use std::f64::consts::PI;
 

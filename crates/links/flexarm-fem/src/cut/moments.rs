@@ -7,7 +7,7 @@ use crate::mesh::BeamProperties;
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
 
-/// `∫ dm`, `∫ r dm`, `∫ r rᵀ dm` with `r` measured from `origin`.
+/// `∫ dm` (kg), `∫ r dm` (kg·m), `∫ r rᵀ dm` (kg·m²) with `r` measured from `origin`, mesh axes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Moments {
     pub(super) origin: Vector3<f64>,
@@ -60,6 +60,9 @@ pub(super) struct Line {
 }
 
 impl Line {
+    /// Creates the line of a beam element between two nodes, mesh axes, m.
+    ///
+    /// * `density`: kg/m³, unless the section has its own mass.
     pub(super) fn new(
         beam: &BeamProperties,
         density: f64,

@@ -181,6 +181,7 @@ pub(crate) const TET10_DISTORTIONS: [f64; 5] = [0.005, 0.07, 0.12, 0.2, 0.35];
 
 impl Tables {
     fn new(kind: ElementKind) -> Self {
+        // Rules of the table at [`Quadrature`], by distortion.
         let (stiffness, mass, calculix) = match kind {
             ElementKind::Tet4 => (vec![tet(TetRule::P1)], vec![tet(TetRule::P4)], tet(TetRule::P1)),
             ElementKind::Tet10 => {

@@ -130,6 +130,10 @@ pub(super) fn read_details(
     Ok(())
 }
 
+/// Reads `[superelement]` and checks sizes, symmetry and agreement with the link.
+///
+/// # Errors
+/// [`FlexFileError`] at the entry that is wrong.
 fn read_superelement(
     node: &Node<'_, '_>,
     units: &Units,
@@ -138,6 +142,7 @@ fn read_superelement(
 ) -> Result<Superelement, FlexFileError> {
     let table = node.table()?;
     table.only(&["interfaces", "stiffness", "mass"])?;
+    // Interfaces: name, pose in the link, tie.
     let mut interfaces = Vec::new();
     let list = table.require("interfaces", "the interfaces, proximal first")?;
     for item in list.list()? {
@@ -156,12 +161,14 @@ fn read_superelement(
         let found = format!("{} interface(s)", interfaces.len());
         return Err(list.fail(FlexErrorKind::WrongSize, found, "two or more", "A and B first"));
     }
+    // Matrices: six rows per interface, then the modes.
     let K = read_dense(&table, "stiffness", 6 * interfaces.len())?;
     let M = read_dense(&table, "mass", 6 * interfaces.len())?;
     if K.nrows() != M.nrows() {
         let found = format!("{} rows of stiffness, {} of mass", K.nrows(), M.nrows());
         return Err(node.fail(FlexErrorKind::WrongSize, found, "as many of both", "is the file cut off?"));
     }
+    // Both must be symmetric to the digits of the file, relative to sqrt(a_ii a_jj).
     for (key, A) in [("stiffness", &K), ("mass", &M)] {
         if let Some(found) = A.diagonal().iter().find(|a| !(**a >= 0.0)) {
             let expected = format!("a {key} without negative diagonal entries");
@@ -217,10 +224,12 @@ fn read_dense(table: &Table<'_, '_>, key: &str, smallest: usize) -> Result<DMatr
     Ok(A)
 }
 
+/// Reads one `[[chain]]`: joints, then parts, and checks that they add up to the link.
 fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<Chain, FlexFileError> {
     let table = node.table()?;
     table.only(&["joint", "part"])?;
     let (mut joints, mut parts) = (Vec::new(), Vec::new());
+    // Joints: pose in the link, stiffness in the axes of the joint.
     for item in table.require("joint", "one [[chain.joint]] between two parts")?.list()? {
         let joint = item.table()?;
         let X_LS = read_pose(&joint, units, &["stiffness"])?;
@@ -235,6 +244,7 @@ fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<
             check_matrix6("K_S", &K, &GateLimits::default()).map_err(|cause| item.refused(cause, expected))?;
         joints.push(ElasticSplit { X_LS, K_S });
     }
+    // Parts: mass properties, link axes.
     for item in table.require("part", "one [[chain.part]] per rigid part")?.list()? {
         let part = item.table()?;
         part.only(&["mass", "com", "inertia"])?;

@@ -35,6 +35,7 @@ const KEYS: [&str; 13] = [
 
 /// Writes the table as text.
 pub(super) fn write_modal(modal: &ModalLink) -> String {
+    // Coordinates and interfaces; shapes only if they are not unit columns.
     let n = modal.coordinates();
     let mut text = String::from(
         "\n[modal]                       # shapes with A held: six per interface, then modes; link axes\n",
@@ -53,6 +54,7 @@ pub(super) fn write_modal(modal: &ModalLink) -> String {
         let rows = modal.interfaces.iter().flat_map(|i| i.Phi.row_iter().map(|row| numbers(row.iter())));
         text += &list("shapes", rows);
     }
+    // Mass, first moment and inertia about Lo; then the integrals of the shapes.
     let J = &modal.inertia;
     text += &format!("mass = {:?}\nfirst_moment = {}\n", modal.mass, numbers(modal.first_moment.iter()));
     let moments = [J[(0, 0)], J[(1, 1)], J[(2, 2)], J[(0, 1)], J[(0, 2)], J[(1, 2)]];
@@ -64,6 +66,7 @@ pub(super) fn write_modal(modal: &ModalLink) -> String {
         let pairs = (0..n).flat_map(|k| (k..n).map(move |l| k * n + l));
         text += &list("N", pairs.map(|at| nine(&modal.N[at])));
     }
+    // Symmetric matrices over the coordinates.
     text += &format!("K = {}\nM = {}\n", triangle(&modal.K), triangle(&modal.M));
     if let Some(G) = &modal.geometric {
         text += "\n[modal.geometric]             # per unit load\n";

@@ -24,11 +24,13 @@ pub(super) fn gate(
     held: &Modes,
     quality: ElementQuality,
 ) -> MeshGate {
+    // Mass properties: of the condensed mass matrix against those of the elements.
     let from_matrix = condensed_body(element);
     let size = link.p_AB().norm().max(f64::MIN_POSITIVE);
     let inertia = |part: &RigidPart| part.spatial_inertia().fixed_view::<3, 3>(3, 3).into_owned();
     let scale = inertia(whole).diagonal().amax();
 
+    // Frequencies with A clamped: mesh, superelement with and without modes, two rigid parts.
     let full = held.frequencies_hz();
     let reduced = element.frequencies_hz(&[0]);
     let guyan = element.guyan().frequencies_hz(&[0]);
@@ -40,6 +42,7 @@ pub(super) fn gate(
         guyan_hz: guyan.get(k).copied(),
         lumped_hz: lumped.get(k).copied(),
     });
+    // A free link has six zero frequencies.
     let free = element.frequencies_hz(&[]);
     let first_elastic = free.get(6).copied().unwrap_or(0.0);
     MeshGate {
@@ -82,6 +85,14 @@ fn rigid_motions(element: &Superelement) -> DMatrix<f64> {
     rigid_motions_about(element, &((p(0) + p(1)) / 2.0))
 }
 
+/// Rigid motions of the interfaces: three translations, three rotations about a point.
+///
+/// ```text
+/// u_I = v + w × (p_LI - point),   θ_I = w
+/// ```
+/// * `point`: link axes, m.
+///
+/// Returns six rows per interface (m, rad; at Io, link axes) and six columns `[v; w]`.
 pub(crate) fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) -> DMatrix<f64> {
     let mut R = DMatrix::zeros(element.boundary(), 6);
     for (k, interface) in element.interfaces.iter().enumerate() {
@@ -93,7 +104,16 @@ pub(crate) fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) 
     R
 }
 
-/// Mass, centre of mass and inertia of the reduced mass matrix: `Rᵀ M R` about the link origin.
+/// Mass properties that the reduced mass matrix implies.
+///
+/// ```text
+/// Rᵀ M R = [  m 1     -m [c]x ]      R: rigid motions of the interfaces about Lo
+///          [ m [c]x     I_Lo  ]
+/// ```
+/// * `element`: link axes, SI. A rigid motion has no modal part, so the modes do not count.
+///
+/// Returns mass (kg), centre of mass from Lo (m) and inertia about it (kg·m²), link axes; not
+/// checked.
 pub fn condensed_body(element: &Superelement) -> RigidPart {
     let n = element.boundary();
     let R = rigid_motions_about(element, &Vector3::zeros());

@@ -19,7 +19,6 @@
 //! moments are then pairs of axial forces of fixed direction. At both ends of each element they are
 //! corrected to rotate by half the section rotation (semi-tangential, as torques already are);
 //! without this, frames with bends are wrong:
-//! which bent frames come out wrong:
 //!
 //! ```text
 //! G_θθ = -M_z (θx θy + θy θx)/2 + M_y (θx θz + θz θx)/2         at each end, M on the element
@@ -77,6 +76,7 @@ impl Field {
         }
     }
 
+    /// Acceleration at the position s, both in link axes.
     fn at(&self, s: &Vector3<f64>) -> Vector3<f64> {
         self.A * s + self.b
     }
@@ -96,18 +96,21 @@ pub(super) fn geometric_stiffness(
     let U = displacements(source, &F);
     let loads = U.ncols();
 
+    // Work of the stress of each load on the second-order strain of the shapes.
     let n = shapes.ncols();
     let mut G = vec![DMatrix::zeros(n, n); loads];
     add_solids(source, &U, shapes, &mut G);
     for (beam, forces) in beams.iter().zip(&beam_forces) {
         add_beam(beam, forces, &U, shapes, &mut G);
     }
+    // Forces of the ties on the mesh, K U - F, on the second-order motion of the tied nodes.
     let mut on_mesh = model.K.product(&U);
     for j in 0..FIELDS {
         on_mesh.column_mut(j).axpy(-1.0, &F.column(j), 1.0);
     }
     add_ties(source, &on_mesh, &mut G);
 
+    // Matrices in the order of the loads.
     let mut G = G.into_iter().map(|G| symmetric_part(&G));
     let mut next = || G.next().unwrap_or_else(|| DMatrix::zeros(n, n));
     GeometricStiffness {
@@ -126,6 +129,7 @@ pub(super) fn displacements_under_loads(source: &ModalSource<'_>) -> DMatrix<f64
     displacements(source, &inertia_forces(source, &beams, &beam_forces))
 }
 
+/// As [`displacements_under_loads`], for given inertia forces.
 fn displacements(source: &ModalSource<'_>, F: &DMatrix<f64>) -> DMatrix<f64> {
     let wrenches = source.condensation.unit_load_shapes();
     let mut U = DMatrix::zeros(F.nrows(), FIELDS + wrenches.ncols());
@@ -136,16 +140,16 @@ fn displacements(source: &ModalSource<'_>, F: &DMatrix<f64>) -> DMatrix<f64> {
     U
 }
 
-/// Inertia forces on the DoF.
+/// Inertia forces on all DoF, link axes (N, N·m), one column per field.
 ///
-/// * `beam_forces`: those of each beam element, beam axes, for the internal forces.
+/// * `beam_forces`: those of each beam element, 12 rows, beam axes.
 fn inertia_forces(source: &ModalSource<'_>, beams: &[BeamElement], beam_forces: &[DMatrix<f64>]) -> DMatrix<f64> {
     let mut F = solid_forces(source);
     for (beam, forces) in beams.iter().zip(beam_forces) {
         for (i, dof) in beam.dofs.iter().enumerate() {
             let corner = i / 3 * 3;
             for j in 0..FIELDS {
-                let turned = beam.R * forces.fixed_view::<3, 1>(corner, j);
+                let turned = beam.R_LE * forces.fixed_view::<3, 1>(corner, j);
                 F[(*dof, j)] += turned[i - corner];
             }
         }
@@ -171,15 +175,15 @@ fn solid_forces(source: &ModalSource<'_>) -> DMatrix<f64> {
 fn element_forces(element: &BeamElement) -> DMatrix<f64> {
     let (l, mu) = (element.beam.length(), element.beam.bar().mass_per_length);
     let D = element.section_moments();
-    let Rt = element.R.transpose();
+    let R_EL = element.R_LE.transpose();
     let mut F = DMatrix::zeros(12, FIELDS);
     for (xi, weight) in gauss4() {
         let section = element.beam.section_at(xi);
         let s = element.point(xi);
         for j in 0..FIELDS {
             let field = Field::unit(j);
-            let force = Rt * field.at(&s) * mu;
-            let torque = Rt * axial(&(D * field.A.transpose()));
+            let force = R_EL * field.at(&s) * mu;
+            let torque = R_EL * axial(&(D * field.A.transpose()));
             let nodal = section.u.transpose() * force + section.theta.transpose() * torque;
             F.column_mut(j).axpy(-weight * l, &nodal, 1.0);
         }
@@ -187,6 +191,7 @@ fn element_forces(element: &BeamElement) -> DMatrix<f64> {
     F
 }
 
+/// Adds `∫ Σ_c ∇φ_k,cᵀ σ ∇φ_l,c dV` over the solids, for the stress σ of each column of `U`.
 fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>, G: &mut [DMatrix<f64>]) {
     let model = source.condensation.model();
     let (n, loads) = (shapes.ncols(), U.ncols());
@@ -225,6 +230,7 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
                 let (p, c, b) = entry(row);
                 right[p * n + k][(c, b)]
             });
+            // G += A B with A[k, (p, c, b)] = (∇φ_k σ_p w_p)_cb, B[(p, c, b), l] = (∇φ_l)_cb.
             for (j, G) in G.iter_mut().enumerate() {
                 let stressed: Vec<_> = (0..points * n).map(|at| right[at] * stresses[at / n * loads + j]).collect();
                 let A = DMatrix::from_fn(n, 9 * points, |k, row| {
@@ -237,6 +243,10 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
     }
 }
 
+/// Adds the work of the internal forces of one beam element; see the module.
+///
+/// * `forces`: its inertia forces, 12 rows, beam axes.
+/// * `U`: displacements of all DoF under each load; `shapes`: per coordinate.
 fn add_beam(
     element: &BeamElement,
     forces: &DMatrix<f64>,

@@ -1,7 +1,7 @@
 //! Node adjacency of a mesh, and position of element matrix blocks in the sparse matrix.
 //!
-//! The pattern over nodes is expanded to DoF; blocks of an element are then added without a search per
-//! entry. Not here: the values, which the parent module adds.
+//! The pattern over nodes is expanded to DoF; blocks of an element are then added without a search
+//! per entry. Not here: the values, which the parent module adds.
 
 use std::sync::Arc;
 

@@ -153,7 +153,7 @@ pub(crate) fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Re
 /// from one basis.
 ///
 /// ```text
-/// K_r⁻¹ = K⁻¹ + T C Tᵀ                                T: static shapes of the released support, C = (Tᵀ K T)⁻¹
+/// K_r⁻¹ = K⁻¹ + T C Tᵀ,   C = (Tᵀ K T)⁻¹      T: static shapes of the released support
 /// K_r⁻¹ M [V T] = [V T] P + V_{j+1} R_{j+1} s_last    where V begins with K⁻¹ M T
 /// ```
 /// The basis of the first pencil, extended by T, is a Lanczos basis of the second.
