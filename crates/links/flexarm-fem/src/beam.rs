@@ -92,6 +92,7 @@ impl Beam {
         self.length
     }
 
+    /// The two bending planes, xy and xz, with `φ = 12 EI/(kGA l²)` of each.
     fn planes(&self) -> [Plane; 2] {
         let l = self.length;
         let plane = |w: usize, theta: usize, sign, EI: f64, rotary, shear: f64| Plane {
@@ -310,7 +311,10 @@ impl Plane {
         }
     }
 
-    /// Deflection and rotation of the section at `xi = x/l` per (w_A, theta_A, w_B, theta_B).
+    /// Deflection N and rotation `N_theta` of the section at `xi = x/l` per (w_A, theta_A, w_B,
+    /// theta_B), where theta is dw/dx without shear.
+    ///
+    /// Source: [Friedman & Kosmatka 1993], exact for end loads.
     fn shapes(&self, xi: f64, l: f64) -> (Vector4<f64>, Vector4<f64>) {
         let phi = self.phi;
         let (x2, x3) = (xi * xi, xi * xi * xi);

@@ -156,6 +156,7 @@ pub fn check_matrix6(
     Ok((K, report))
 }
 
+/// Rejects the first entry that is not finite.
 fn check_finite<const N: usize>(what: &'static str, K: &SMatrix<f64, N, N>) -> Result<(), FemError> {
     for row in 0..N {
         for column in 0..N {
@@ -185,6 +186,7 @@ fn diagonal_scale<const N: usize>(
     Ok(diagonal.map(f64::sqrt))
 }
 
+/// Maximum of `|k_ij - k_ji|/(s_i s_j)`; an error if it is above the limit or NaN.
 fn check_symmetry<const N: usize>(
     what: &'static str,
     K: &SMatrix<f64, N, N>,
@@ -246,6 +248,8 @@ struct RigidResidual {
     row: String,
 }
 
+/// Maximum force `|(K R)_im|/(s_i Σ_k s_k |R_km|)` over rows i and rigid motions m, as in the
+/// module.
 fn rigid_body_residual(K: &Matrix12, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) -> RigidResidual {
     const MOTIONS: [&str; 6] = [
         "translation along x",

@@ -325,6 +325,8 @@ pub(crate) fn beam_stiffness(mesh: &Mesh, region: usize, nodes: &[u32], material
     Some(DMatrix::from_column_slice(12, 12, K.as_slice()))
 }
 
+/// Adds the beams of a block: stiffness to K, mass as triplets (row, column, value) of its lower
+/// triangle.
 fn add_beams(
     mesh: &Mesh,
     block: &ElementBlock,

@@ -137,6 +137,9 @@ struct Edge {
 }
 
 impl<'m> Hierarchy<'m> {
+    /// Finds the new nodes and inverts their diagonal blocks.
+    ///
+    /// * `model`: of second order; `ends`: nodes of each edge, in the order of the new nodes.
     fn new(mesh: &Mesh, interfaces: &[Interface], model: &'m FeModel, ends: Vec<[u32; 2]>) -> Self {
         let tied = tied_edges(mesh, interfaces);
         let first = |node: u32| model.dofs.of(node as usize).start;

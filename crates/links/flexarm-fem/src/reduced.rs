@@ -140,6 +140,7 @@ impl ReducedLink {
         Self::assemble(name.into(), frames, K_BB, checks, parts, provenance)
     }
 
+    /// Checks the parts and places the elastic joint.
     fn assemble(
         name: String,
         frames: LinkFrames,
@@ -267,6 +268,7 @@ impl ReducedLink {
     }
 }
 
+/// Elastic joint at S of the stiffness at Bo, link axes.
 fn elastic_split(frames: &LinkFrames, K_BB: &Matrix6<f64>) -> Result<ElasticSplit, FemError> {
     let K_S = stiffness_at_split(K_BB, &frames.X_BS())?;
     Ok(ElasticSplit { X_LS: frames.X_LS, K_S })

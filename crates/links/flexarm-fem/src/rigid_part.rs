@@ -120,6 +120,7 @@ impl RigidPart {
         self.check_inertia(part)
     }
 
+    /// Checks symmetry, sign and triangle inequality of the principal moments.
     fn check_inertia(&self, part: &str) -> Result<(), FemError> {
         let refuse = |principal: [f64; 3], rule| {
             let part = part.to_owned();
@@ -142,6 +143,7 @@ impl RigidPart {
         };
         let mut principal = [eigen.eigenvalues[0], eigen.eigenvalues[1], eigen.eigenvalues[2]];
         principal.sort_by(f64::total_cmp);
+        // Each principal moment is a sum of two second moments, none of which is negative.
         let [low, middle, high] = principal;
         let principal = principal.map(|x| x * size);
         if low <= 0.0 {

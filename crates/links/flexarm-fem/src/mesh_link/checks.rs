@@ -132,6 +132,8 @@ pub(super) fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<F
     let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let first = held.frequencies_hz().first().copied();
     let mut findings = Vec::new();
+    // A value outside its range gives one warning; `slip` names the wrong unit that would explain
+    // it.
     let mut see = |what: &str, value: f64, unit: &str, low: f64, high: f64, slip: &str| {
         if !(low..=high).contains(&value) {
             let said = format!(

@@ -100,6 +100,7 @@ pub(crate) fn split_point(
             let C_BB = spd_inverse(&K_BB).map(|C| symmetric_part(&Matrix6::from_column_slice(C.as_slice())));
             let centre = C_BB.and_then(|C_BB| centre_of_compliance(&C_BB, &p_LB));
             let fraction = |p_L: &Vector3<f64>| (p_L - p_LA).dot(&p_AB) / p_AB.norm_squared();
+            // Not near an end, where one part would be almost empty.
             match centre.filter(|p| (0.1..=0.9).contains(&fraction(p)) && possible(*p)) {
                 Some(centre) => (centre, None),
                 None => {

@@ -327,6 +327,7 @@ fn turned(stiffness: &GeometricStiffness, R: &Matrix3<f64>) -> GeometricStiffnes
         std::array::from_fn(|i| &G[0] * R[(i, 0)] + &G[1] * R[(i, 1)] + &G[2] * R[(i, 2)])
     };
     let six = |G: &[DMatrix<f64>; 6]| -> [DMatrix<f64>; 6] {
+        // Forces and torques turn alike.
         let [x, y, z] = three(&G[..3]);
         let [rx, ry, rz] = three(&G[3..]);
         [x, y, z, rx, ry, rz]

@@ -150,6 +150,7 @@ fn small(C: &DMatrix<f64>, first: usize, count: usize) -> Small {
     std::array::from_fn(|i| Row(std::array::from_fn(|j| entry(i, j))))
 }
 
+/// Products `V_kᵀ X` of several blocks with one.
 struct Grams<'a> {
     basis: &'a [Block],
     X: &'a [Row],

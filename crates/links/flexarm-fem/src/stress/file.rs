@@ -178,6 +178,7 @@ impl<'a> Tensors<'a> {
         Ok(tensor.data().as_chunks().0.iter().map(|word| f64::from_le_bytes(*word)).collect())
     }
 
+    /// Rows of a matrix of numbers with the given width.
     fn rows(&self, name: &'static str, width: usize) -> Result<Vec<Vec<f64>>, StressError> {
         let tensor = self.tensor(name, Dtype::F64)?;
         if tensor.shape().len() != 2 || tensor.shape()[1] != width {
@@ -198,6 +199,7 @@ impl<'a> Tensors<'a> {
         Ok(tensor.data().as_chunks().0.iter().map(|word| u64::from(u32::from_le_bytes(*word))).collect())
     }
 
+    /// Sites, with their materials checked against the number of materials.
     fn sites(&self, materials: usize) -> Result<Vec<StressSite>, StressError> {
         let positions = self.rows("position", 3)?;
         let (nodes, kinds, tied) = (self.whole("node")?, self.whole("material")?, self.numbers("from_tie")?);

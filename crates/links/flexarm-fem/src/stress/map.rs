@@ -179,6 +179,7 @@ impl StressFields {
             for (k, (column, factor)) in columns.iter().zip(factors).enumerate() {
                 mapped.set_column(k, &(fields.column(*column) * *factor as f32));
             }
+            // S_a,j - Σ_k own_k S_k, in f64: the difference of two large fields.
             let mut residual = vec![0.0_f64; rows];
             for (j, own) in own.iter().enumerate() {
                 let of_mesh = fields.column(wrenches + j);

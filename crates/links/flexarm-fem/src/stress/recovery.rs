@@ -264,6 +264,7 @@ struct Extrapolation {
 }
 
 impl Extrapolation {
+    /// Pseudo-inverse of the corners' shape functions at the points of Calculix's rule.
     fn of(kind: ElementKind) -> Self {
         let corner_kind = match kind {
             ElementKind::Tet10 => ElementKind::Tet4,
