@@ -20,7 +20,7 @@
 //! Source: Castigliano's theorem for `C_BB`; sharing by energy is our own.
 //!
 //! Start at `ChainSource::chain`. Link axes; compliances in m/N to rad/(N·m). Not here: chains of
-//! a beam in closed form (`beam_chain`), the volume of cut elements ([`crate::cut`]).
+//! a beam in closed form (`beam_chain`), the volume of cut elements ([`cut`](crate::cut())).
 
 use flexarm_spatial::{Pose, adjoint, skew, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3, Vector6};

@@ -2,7 +2,7 @@
 //!
 //! Link axes; the inertia is about the centre of mass, kg·m². Start at [`RigidPart`].
 //!
-//! Not here: the cut of a mesh ([`crate::cut`]), spatial inertias of recursions
+//! Not here: the cut of a mesh ([`cut`](crate::cut())), spatial inertias of recursions
 //! ([`flexarm_spatial::SpatialInertia`]).
 
 use flexarm_spatial::{Pose, skew, symmetric_part};

@@ -1,7 +1,7 @@
 //! Cut of the mesh into the two parts of a link, and bodies attached to them.
 //!
 //! Start at [`split`]; [`SplitAt`] says where. Link axes. Not here: the volume of cut elements
-//! ([`crate::cut`]).
+//! ([`cut`](crate::cut())).
 
 use flexarm_spatial::{Matrix12, Pose, symmetric_part};
 use nalgebra::{DMatrix, Matrix6, Vector3};

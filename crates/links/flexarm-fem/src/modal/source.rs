@@ -9,7 +9,7 @@
 //! ```
 //! M_s, x and φ are those of the FE model, so both formulas are exact for its displacement field:
 //! for solids of any shape, and for beams with four Gauss points for the cubic shapes of
-//! [`Beam`](crate::Beam).
+//! [`Beam`].
 
 use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};

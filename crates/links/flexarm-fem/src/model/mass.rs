@@ -3,7 +3,7 @@
 //! Rows are DoF, kg, kg·m, kg·m². Start at [`MassMatrix::product`].
 //!
 //! Not here: masses of elements ([`crate::element`], [`crate::beam`]), mass properties of a body
-//! ([`crate::cut`]).
+//! ([`cut`](crate::cut())).
 
 use flexarm_spatial::Real;
 use nalgebra::DMatrix;
