@@ -49,7 +49,7 @@ pub struct Wrench<T: Scalar = f64> {
 macro_rules! pair_algebra {
     ($type:ident, $first:ident, $second:ident) => {
         impl<T: Real> $type<T> {
-            /// Creates it from its two parts.
+            /// Creates it from its linear and its angular part, same point and axes.
             #[inline(always)]
             pub fn new($first: Vector3<T>, $second: Vector3<T>) -> Self {
                 Self { $first, $second }
@@ -255,19 +255,25 @@ impl SpatialInertia {
         Self { mass: 0.0, first_moment: Vector3::zeros(), rotational: Matrix3::zeros() }
     }
 
-    /// Creates it from mass (kg), centre of mass `p_BoBcm_B` (m) and inertia about the centre of
-    /// mass, in B axes (kg m²).
+    /// Creates it from the mass properties of a body.
+    ///
+    /// ```text
+    /// h = m c,   I = I_cm - m [c]x²      c = p_BoBcm_B
+    /// ```
+    /// * `mass`: kg.
+    /// * `com`: `p_BoBcm_B`, m.
+    /// * `inertia_com`: `I_cm` about the centre of mass, in B axes, kg·m².
     pub fn from_com(mass: f64, com: &Vector3<f64>, inertia_com: &Matrix3<f64>) -> Self {
         let c = skew(com);
         Self { mass, first_moment: com * mass, rotational: inertia_com - c * c * mass }
     }
 
-    /// Centre of mass `p_BoBcm_B` (m); zero for a massless body.
+    /// Centre of mass `p_BoBcm_B = h/m` (m); zero for a massless body.
     pub fn com(&self) -> Vector3<f64> {
         if self.mass == 0.0 { Vector3::zeros() } else { self.first_moment / self.mass }
     }
 
-    /// Inertia about the centre of mass, in B axes (kg m²).
+    /// Inertia about the centre of mass, in B axes: `I + m [c]x²`, `c = p_BoBcm_B` (kg m²).
     pub fn inertia_com(&self) -> Matrix3<f64> {
         let c = skew(&self.com());
         self.rotational + c * c * self.mass

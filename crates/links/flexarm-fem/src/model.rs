@@ -318,7 +318,7 @@ pub(crate) fn beam_of(
     Ok((beam, Q))
 }
 
-/// Stiffness of one beam element in mesh axes.
+/// Stiffness of one beam element, 12×12, both nodes, mesh axes; `None` for an invalid beam.
 pub(crate) fn beam_stiffness(mesh: &Mesh, region: usize, nodes: &[u32], material: &Material) -> Option<DMatrix<f64>> {
     let (beam, Q) = beam_of(mesh, region, nodes, material).ok()?;
     let K = Q * beam.stiffness12() * Q.transpose();
@@ -355,7 +355,10 @@ fn add_beams(
     Ok(())
 }
 
-/// Axes of a beam in mesh axes, as columns: x along it, y as close to `y_axis` as possible.
+/// Rotation `R_ME` of the beam axes E in mesh axes M: x along the beam, y as close to `y_axis` as
+/// possible.
+///
+/// * `along`, `y_axis`: mesh axes, any length.
 pub(crate) fn beam_axes(along: &Vector3<f64>, y_axis: &Vector3<f64>) -> Result<nalgebra::Matrix3<f64>, FemError> {
     let x = along.normalize();
     let y = y_axis - x * x.dot(y_axis);

@@ -258,7 +258,8 @@ impl ReducedLink {
 
     /// Reduces `K_S` to its diagonal, as a plain spring model does.
     ///
-    /// Only to show the resulting error; `K_BB` is updated so that the link stays consistent.
+    /// Only to show the resulting error; `K_BB = Ad_SBᵀ diag(K_S) Ad_SB`, so that the link stays
+    /// consistent. The parts are unchanged.
     pub fn without_coupling(&self) -> Self {
         let K_S = drop_coupling(&self.split.K_S);
         let Ad_SB = adjoint(&self.frames().X_BS().inverse());

@@ -215,7 +215,12 @@ impl Section {
         }
     }
 
-    /// Stiffness and mass of the section with a material.
+    /// Stiffness and mass of the section with a material, along its axes y and z.
+    ///
+    /// ```text
+    /// EA, EI_y, EI_z, GJ, k_y GA, k_z GA,   μ = rho A,   rotary = rho I
+    /// ```
+    /// * `material`: not used by [`Section::Given`].
     ///
     /// # Errors
     /// As [`Section::properties`], and [`FemError::OutOfRange`] for an impossible material or bar.

@@ -1,4 +1,7 @@
-//! Mass moments of order 0, 1 and 2 about a fixed point.
+//! Mass moments of order 0, 1 and 2 about a fixed point: [`Moments`] of any body, [`Line`] of a
+//! beam.
+//!
+//! Mesh axes, m, kg. Not here: the quadrature of solids (`piece`).
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -90,7 +93,7 @@ impl Line {
         Ok(Self { start, along, mass: mass_per_length * length, section })
     }
 
-    /// Moments of the piece between two fractions of the length.
+    /// Moments of the piece between two fractions of the length, about `origin` (mesh axes, m).
     pub(super) fn piece(&self, from: f64, to: f64, origin: &Vector3<f64>) -> Moments {
         let share = to - from;
         let mut moments = Moments::about(*origin);

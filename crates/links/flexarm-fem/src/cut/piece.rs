@@ -31,8 +31,8 @@ pub(super) enum Side {
     Crossed,
 }
 
-/// Position of an element; some curved elements near the plane are reported as crossed although
-/// they are not.
+/// Position of an element with the nodes x (mesh axes, m); some curved elements near the plane are
+/// reported as crossed although they are not.
 pub(super) fn side(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane) -> Side {
     let corners = corners(kind);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -66,14 +66,15 @@ fn corners(kind: ElementKind) -> usize {
     }
 }
 
-/// Fractions of the length of a crossed beam between which it is ahead of the plane.
+/// Fractions of the length of a crossed beam, from its first node, between which it is ahead of the
+/// plane.
 pub(super) fn ahead_of_line(x: &[Vector3<f64>], plane: &Plane) -> (f64, f64) {
     let (d_0, d_1) = (plane.distance(&x[0]), plane.distance(&x[1]));
     let root = d_0 / (d_0 - d_1);
     if d_0 > 0.0 { (0.0, root) } else { (root, 1.0) }
 }
 
-/// Exact moments of the volume of an element.
+/// Exact moments of the volume of an element (m³, m⁴, m⁵) about `origin`; x, origin: mesh axes, m.
 pub(super) fn whole(kind: ElementKind, x: &[Vector3<f64>], origin: &Vector3<f64>) -> Result<Moments, InvertedElement> {
     let mut moments = Moments::about(*origin);
     for_each_point(kind, x, Purpose::Mass, Quadrature::Exact, |point| {
@@ -82,7 +83,7 @@ pub(super) fn whole(kind: ElementKind, x: &[Vector3<f64>], origin: &Vector3<f64>
     Ok(moments)
 }
 
-/// Moments of the volume of an element ahead of the plane.
+/// As [`whole`], of the volume ahead of the plane; see the module for its error.
 pub(super) fn ahead(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane, origin: &Vector3<f64>) -> Moments {
     let n = kind.nodes();
     let mut d = [0.0; 20];

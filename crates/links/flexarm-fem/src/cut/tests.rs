@@ -1,3 +1,5 @@
+//! Cut meshes against closed forms: boxes, tetrahedra, pipes, bent bars and beams.
+
 use nalgebra::{Matrix3, Rotation3, Vector3, vector};
 
 use super::*;

@@ -1,4 +1,7 @@
 //! Frames of a reduced-link file, written and read: `[interface.A]`, `[interface.B]`, `[split]`.
+//!
+//! Poses in the link frame: `xyz` in the unit of the file, `rpy` in rad with R = Rz Ry Rx, or the
+//! matrix by rows. Not here: limits of the frames ([`LinkFrames`]).
 
 use flexarm_spatial::Pose;
 use nalgebra::{Matrix3, Rotation3, Translation3};

@@ -29,6 +29,8 @@ const LARGEST: u64 = 256 << 20;
 
 /// Reads a reduced-link file.
 ///
+/// Returns the checked link: SI, `K_BB` at Bo in link axes.
+///
 /// # Errors
 /// [`FlexFileError`] with file, line, column, element, value found and value expected.
 pub fn read_flex(path: impl AsRef<Path>) -> Result<ReducedLink, FlexFileError> {

@@ -84,7 +84,9 @@ impl Field {
 
 /// Computes the geometric stiffness of all unit loads.
 ///
-/// * `shapes`: displacements of all DoF per coordinate.
+/// * `shapes`: displacements of all DoF per coordinate, link axes.
+///
+/// Returns one n×n matrix per load for n coordinates, symmetric.
 pub(super) fn geometric_stiffness(
     source: &ModalSource<'_>,
     beams: &[BeamElement],
@@ -121,8 +123,8 @@ pub(super) fn geometric_stiffness(
     }
 }
 
-/// Displacements of all DoF with A clamped under the inertia loads, then under unit wrenches on the
-/// interfaces after the first.
+/// Displacements of all DoF (m, rad; link axes) with A clamped, under the [`FIELDS`] inertia loads,
+/// then under unit wrenches on the interfaces after the first.
 pub(super) fn displacements_under_loads(source: &ModalSource<'_>) -> DMatrix<f64> {
     let beams = source.beams();
     let beam_forces: Vec<_> = beams.iter().map(element_forces).collect();

@@ -171,8 +171,10 @@ impl ModalLink {
             .map_or_else(Vec::new, |pairs| pairs.omega.iter().map(|omega| omega / std::f64::consts::TAU).collect())
     }
 
-    /// Natural frequencies of the free link, Hz, ascending; the first six belong to rigid motions
-    /// and are near zero.
+    /// Natural frequencies of the free link: of `blkdiag(0, K)` and [`Self::mass_matrix`].
+    ///
+    /// Returns 6 + n frequencies, Hz, ascending; the first six belong to rigid motions and are near
+    /// zero. Empty if the mass is not positive definite.
     pub fn free_frequencies_hz(&self) -> Vec<f64> {
         let n = self.coordinates();
         let mut K = DMatrix::zeros(6 + n, 6 + n);

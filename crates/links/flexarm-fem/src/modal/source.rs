@@ -78,7 +78,7 @@ impl BeamElement {
         self.R_LE * D_E * self.R_LE.transpose()
     }
 
-    /// Position on the centre line, link axes, m.
+    /// Position `p_L` of the centre line at `xi = x/l`, m.
     pub(super) fn point(&self, xi: f64) -> Vector3<f64> {
         self.p_LE + self.R_LE.column(0) * (xi * self.beam.length())
     }
@@ -166,7 +166,8 @@ impl ModalSource<'_> {
         U
     }
 
-    /// Displacements of all DoF per coordinate, A clamped.
+    /// Displacements φ of all DoF per coordinate, A clamped, link axes: static shapes of the
+    /// interfaces after the first, then modes.
     pub(super) fn shapes(&self) -> DMatrix<f64> {
         let (T, modes) = (self.condensation.shapes(), &self.fixed_modes.shapes);
         let statics = T.ncols() - 6;

@@ -91,7 +91,8 @@ pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
     Some(Matrix12::from_column_slice(K12.as_slice()))
 }
 
-/// Frequencies of a small dense pencil, Hz, ascending; empty if the mass is not positive definite.
+/// Frequencies `sqrt(λ)/2π` of a small dense pencil `K φ = λ M φ`, SI: Hz, ascending; negative λ
+/// count as zero. Empty if the mass is not positive definite.
 pub(crate) fn generalised_frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
     // Rows have different units, so both matrices are scaled by the mass first.
     let scale = M.diagonal().map(|m| 1.0 / m.sqrt());

@@ -147,8 +147,12 @@ impl Condensation<'_> {
         -(self.tip.row(i - 6) * K_BA)[(0, 0)]
     }
 
-    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode on the mesh, over the free DoF; for
-    /// modes under any support.
+    /// Residual of each mode on the mesh, over the free DoF; for modes under any support.
+    ///
+    /// ```text
+    /// ‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖      λ: least squares
+    /// ```
+    /// * `modes`: shapes over all DoF, as the functions above return them.
     pub fn mode_residuals(&self, modes: &Modes) -> Vec<f64> {
         let K = self.model.K.product(&modes.shapes);
         let M = self.model.M.product(&modes.shapes);

@@ -1,4 +1,12 @@
 //! Lanczos basis, built block by block, and the projected operator.
+//!
+//! ```text
+//! K⁻¹ M V = V H + V_{j+1} R_{j+1} e_jᵀ,   Vᵀ M V = 1,   H block tridiagonal
+//! ```
+//! Start at [`Basis::start`] and [`Basis::advance`]; [`Basis::into_modes`] ends it. Rows are all
+//! DoF of the model. Not here: when the modes are good enough (the parent module).
+//!
+//! Source: [Grimes, Lewis & Simon 1994].
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -32,7 +40,8 @@ pub(super) struct Basis {
     /// Dimension of the space.
     dimension: usize,
     solves: usize,
-    next_look: usize,
+    /// Size of the basis from which the projected operator is solved again.
+    next_solve: usize,
 }
 
 /// Products of T, the shapes of a released support, with the basis.
@@ -83,7 +92,7 @@ impl Basis {
             beside: None,
             dimension: pencil.dimension,
             solves: W.width,
-            next_look: 0,
+            next_solve: 0,
         };
         basis.append(W, MW, pencil, sizes2.as_slice())?;
         if basis.is_exhausted() {
@@ -156,6 +165,8 @@ impl Basis {
     /// ```text
     /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
     /// ```
+    /// B is found in two passes, `B = Q L⁻ᵀ`.
+    ///
     /// * `MW`: workspace for M W.
     /// * `sizes2`: at the start, `xᵀ M x` of the columns x with W = `K⁻¹ M x`.
     fn append(
@@ -214,13 +225,13 @@ impl Basis {
     }
 
     /// Whether the projected operator should be solved now; `count`: number of requested modes.
-    pub(super) fn is_to_be_looked_at(&mut self, count: usize, limit: usize) -> bool {
+    pub(super) fn is_solve_due(&mut self, count: usize, limit: usize) -> bool {
         // The cost of the small eigenproblem grows with the cube of the basis, so a larger one is
         // solved less often.
-        if self.len() < self.next_look.max(2 * count + WIDTH) && !self.is_full(limit) {
+        if self.len() < self.next_solve.max(2 * count + WIDTH) && !self.is_full(limit) {
             return false;
         }
-        self.next_look = self.len() + (self.len() / 12).max(1);
+        self.next_solve = self.len() + (self.len() / 12).max(1);
         true
     }
 
