@@ -31,7 +31,8 @@ impl GeometricStiffness {
         self.acceleration.iter().chain(&self.angular).chain(&self.centrifugal).chain(self.interface.iter().flatten())
     }
 
-    /// Applies `f` to all matrices.
+    /// Applies `f` to each n×n matrix: a change of coordinates `Vᵀ G V` gives m×m matrices per the
+    /// same unit loads.
     #[must_use]
     pub fn mapped(&self, f: &dyn Fn(&DMatrix<f64>) -> DMatrix<f64>) -> Self {
         Self {

@@ -111,7 +111,9 @@ pub fn tr_mul3<T: Real>(A: &Matrix3<T>, B: &Matrix3<T>) -> Matrix3<T> {
     columns(tr_mul(A, &column(B, 0)), tr_mul(A, &column(B, 1)), tr_mul(A, &column(B, 2)))
 }
 
-/// `R A Rᵀ` for a symmetric A.
+/// `R A Rᵀ` for a symmetric A, such as an inertia `I_A = R_AB I_B R_ABᵀ`.
+///
+/// Computes six entries; the result is symmetric bit for bit.
 #[inline(always)]
 pub fn turn_symmetric<T: Real>(R: &Matrix3<T>, A: &Matrix3<T>) -> Matrix3<T> {
     let [t0, t1, t2] = &mul3(R, A).data.0;
@@ -125,7 +127,7 @@ pub fn turn_symmetric<T: Real>(R: &Matrix3<T>, A: &Matrix3<T>) -> Matrix3<T> {
     Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz)
 }
 
-/// `[p]x A`.
+/// `[p]x A`: cross product of p with each column of A.
 #[inline(always)]
 pub fn cross3<T: Real>(p: &Vector3<T>, A: &Matrix3<T>) -> Matrix3<T> {
     by_columns(

@@ -46,7 +46,19 @@ pub struct AngleKinematics<T: Scalar = f64> {
 }
 
 impl ElasticAngles {
-    /// Rotation, rate map and bias at `angles` (rad) and `rates` (rad/s).
+    /// Rotation, rate map and bias of a joint.
+    ///
+    /// ```text
+    /// R = R_PQ,   w_PQ_Q = B rates,   d(w_PQ_Q)/dt = B d(rates)/dt + bias
+    /// ```
+    /// * `angles`: of Q relative to P, rad.
+    /// * `rates`: their time derivatives, rad/s.
+    ///
+    /// Returns `R` and `B` (both dimensionless) and `bias` (rad/s², Q axes). `B` is singular at a
+    /// full turn of the rotation vector and at `ry = ±π/2` of the Euler angles.
+    ///
+    /// # Source
+    /// [Bullo & Murray 1995] for the rotation vector, [Shabana 2013], chapter 2, for Euler angles.
     #[inline(always)]
     pub fn kinematics<T: Real>(self, angles: &Vector3<T>, rates: &Vector3<T>) -> AngleKinematics<T> {
         match self {
@@ -55,7 +67,11 @@ impl ElasticAngles {
         }
     }
 
-    /// Rotation and rate map, without the bias.
+    /// Rotation `R_PQ` and rate map `B` as in [`Self::kinematics`], without the bias.
+    ///
+    /// * `angles`: of Q relative to P, rad.
+    ///
+    /// Returns `(R_PQ, B)`, both 3×3 and dimensionless.
     #[inline(always)]
     pub fn pose<T: Real>(self, angles: &Vector3<T>) -> (Matrix3<T>, Matrix3<T>) {
         match self {
@@ -67,7 +83,12 @@ impl ElasticAngles {
         }
     }
 
-    /// Matrix `dB/dt` at `angles` (rad) and `rates` (rad/s).
+    /// Time derivative `dB/dt` of the rate map; `dB/dt rates` is the bias of [`Self::kinematics`].
+    ///
+    /// * `angles`: of Q relative to P, rad.
+    /// * `rates`: their time derivatives, rad/s.
+    ///
+    /// Returns a 3×3 matrix, rad/s, with rows in Q axes and one column per angle.
     #[inline(always)]
     pub fn rate_map_derivative<T: Real>(self, angles: &Vector3<T>, rates: &Vector3<T>) -> Matrix3<T> {
         match self {
@@ -85,7 +106,12 @@ impl ElasticAngles {
         }
     }
 
-    /// Angles of a rotation matrix, the inverse of `kinematics(..).R`.
+    /// Angles of a rotation matrix: the inverse of the rotation of [`Self::kinematics`].
+    ///
+    /// * `R`: `R_PQ`, orthonormal.
+    ///
+    /// Returns the angles, rad: a rotation vector of at most half a turn, or Euler angles with `ry`
+    /// from -π/2 to π/2. At `ry = ±π/2` only the sum or difference of `rx` and `rz` is determined.
     pub fn from_rotation(self, R: &Matrix3<f64>) -> Vector3<f64> {
         match self {
             Self::RotationVector => rotation_vector(R),
@@ -104,7 +130,10 @@ impl ElasticAngles {
 /// ```text
 /// (R - Rᵀ)/2 = sin θ [a]x,   (R + Rᵀ)/2 = cos θ 1 + (1 - cos θ) a aᵀ
 /// ```
-/// At exactly half a turn both `a` and `-a` are valid; one of them is returned.
+/// * `R`: `R_AB`, orthonormal.
+///
+/// Returns `θ a`, rad, with the same components in A and in B. At exactly half a turn both `a` and
+/// `-a` are valid; one of them is returned.
 pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     let skew = 0.5 * Vector3::new(R[(2, 1)] - R[(1, 2)], R[(0, 2)] - R[(2, 0)], R[(1, 0)] - R[(0, 1)]);
     let (square, cosine) = (skew.norm_squared(), 0.5 * (R.trace() - 1.0));
@@ -126,7 +155,15 @@ pub fn rotation_vector(R: &Matrix3<f64>) -> Vector3<f64> {
     if axis.dot(&skew) < 0.0 { -axis * angle } else { axis * angle }
 }
 
-/// Unit quaternion of a rotation vector: `[cos(theta/2), sin(theta/2)/theta phi]`.
+/// Unit quaternion of a rotation vector.
+///
+/// ```text
+/// q = [cos(θ/2), sin(θ/2)/θ φ],   θ = |φ|
+/// ```
+/// * `phi`: rotation vector φ of `R_AB`, rad.
+///
+/// Returns q of `R_AB`, scalar part first in the formula; unit length to rounding without a
+/// normalisation.
 pub fn quaternion(phi: &Vector3<f64>) -> UnitQuaternion<f64> {
     let x = 0.25 * dot(phi, phi);
     let [s, a, ..] = exponential_coefficients(x);

@@ -15,7 +15,12 @@ use crate::real::Real;
 /// Pose `X_AB` of frame B in frame A, as rotation matrix and translation (m). `p_A = X_AB * p_B`.
 pub type Pose<T = f64> = IsometryMatrix3<T>;
 
-/// Composition `X_AC = X_AB X_BC`.
+/// Composition of poses, `X_AC = X_AB X_BC`.
+///
+/// ```text
+/// R_AC = R_AB R_BC,   p_AoCo_A = p_AoBo_A + R_AB p_BoCo_B
+/// ```
+/// Translations in m. The rotation is not made orthonormal again.
 #[inline(always)]
 pub fn composed(X_AB: &Pose, X_BC: &Pose) -> Pose {
     let R = X_AB.rotation.matrix();
@@ -44,7 +49,7 @@ pub struct Wrench<T: Scalar = f64> {
 macro_rules! pair_algebra {
     ($type:ident, $first:ident, $second:ident) => {
         impl<T: Real> $type<T> {
-            /// Creates it from its two parts.
+            /// Creates it from its linear and its angular part, same point and axes.
             #[inline(always)]
             pub fn new($first: Vector3<T>, $second: Vector3<T>) -> Self {
                 Self { $first, $second }
@@ -112,27 +117,57 @@ pair_algebra!(Twist, linear, angular);
 pair_algebra!(Wrench, force, torque);
 
 impl<T: Real> Twist<T> {
-    /// Power `Fᵀ V` (W); both at the same point, in the same axes.
+    /// Power `V_Aᵀ F_A` of a wrench on a body that moves with this twist, W.
+    ///
+    /// * `F`: at the same point and in the same axes as the twist. The power does not depend on
+    ///   them.
     #[inline(always)]
     pub fn power(&self, F: &Wrench<T>) -> T {
         dot(&self.linear, &F.force) + dot(&self.angular, &F.torque)
     }
 
-    /// Motion cross product `V × U`: time derivative of `U` when it moves with `V`.
+    /// Motion cross product `V × U`: time derivative of a twist `U` that is fixed to a body moving
+    /// with `V`.
+    ///
+    /// ```text
+    /// V × U = [w × u + v × α; w × α]      V = [v; w],   U = [u; α]
+    /// ```
+    /// * `U`: at the same point and in the same axes as V.
+    ///
+    /// Returns a twist at that point, in these axes, units of `U` per s.
+    ///
+    /// # Source
+    /// [Featherstone 2008], section 2.9, with the linear part first.
     #[inline(always)]
     pub fn cross(&self, U: &Twist<T>) -> Twist<T> {
         let (v, w) = (&self.linear, &self.angular);
         Twist::new(add(&cross(w, &U.linear), &cross(v, &U.angular)), cross(w, &U.angular))
     }
 
-    /// Force cross product `V ×* F`: time derivative of `F` when it moves with `V`.
+    /// Force cross product `V ×* F`: time derivative of a wrench (or momentum) `F` that is fixed to
+    /// a body moving with `V`.
+    ///
+    /// ```text
+    /// V ×* F = [w × f; w × t + v × f]      V = [v; w],   F = [f; t]
+    /// ```
+    /// * `F`: at the same point and in the same axes as V.
+    ///
+    /// Returns a wrench at that point, in these axes, units of `F` per s.
+    ///
+    /// # Source
+    /// [Featherstone 2008], section 2.9, with the linear part first.
     #[inline(always)]
     pub fn cross_force(&self, F: &Wrench<T>) -> Wrench<T> {
         let (v, w) = (&self.linear, &self.angular);
         Wrench::new(cross(w, &F.force), add(&cross(w, &F.torque), &cross(v, &F.force)))
     }
 
-    /// `Ad_BA V_A`: the same motion at Bo in B axes, for `X_AB` (B fixed to A's body).
+    /// Twist `V_B = Ad_BA V_A` of the same body, from Ao, A axes to Bo, B axes.
+    ///
+    /// ```text
+    /// v_B = R_ABᵀ (v_A + w_A × p_AoBo_A),   w_B = R_ABᵀ w_A
+    /// ```
+    /// * `X_AB`: pose of B in A, m; both frames are fixed to the body.
     #[inline(always)]
     pub fn at_child(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
@@ -140,7 +175,8 @@ impl<T: Real> Twist<T> {
         Twist::new(tr_mul(R, &add(&self.linear, &cross(&self.angular, p))), tr_mul(R, &self.angular))
     }
 
-    /// Inverse of [`Twist::at_child`]: from Bo, B axes to Ao, A axes.
+    /// Twist `V_A = Ad_AB V_B` of the same body, from Bo, B axes to Ao, A axes: the inverse of
+    /// [`Twist::at_child`] for the same `X_AB`.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose<T>) -> Twist<T> {
         let R = X_AB.rotation.matrix();
@@ -150,7 +186,12 @@ impl<T: Real> Twist<T> {
 }
 
 impl<T: Real> Wrench<T> {
-    /// `Ad_BAᵀ F_B`: the same wrench at Ao in A axes, for `X_AB`.
+    /// Wrench `F_A = Ad_BAᵀ F_B` that is statically equivalent, from Bo, B axes to Ao, A axes.
+    ///
+    /// ```text
+    /// f_A = R_AB f_B,   t_A = R_AB t_B + p_AoBo_A × f_A
+    /// ```
+    /// * `X_AB`: pose of B in A, m.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose<T>) -> Wrench<T> {
         let R = X_AB.rotation.matrix();
@@ -158,7 +199,8 @@ impl<T: Real> Wrench<T> {
         Wrench::new(force, add(&mul(R, &self.torque), &cross(&X_AB.translation.vector, &force)))
     }
 
-    /// Inverse of [`Wrench::at_parent`]: from Ao, A axes to Bo, B axes.
+    /// Wrench `F_B = Ad_ABᵀ F_A` that is statically equivalent, from Ao, A axes to Bo, B axes: the
+    /// inverse of [`Wrench::at_parent`] for the same `X_AB`.
     #[inline(always)]
     pub fn at_child(&self, X_AB: &Pose<T>) -> Wrench<T> {
         let R = X_AB.rotation.matrix();
@@ -167,16 +209,26 @@ impl<T: Real> Wrench<T> {
     }
 }
 
-/// Skew matrix `[r]x` with `[r]x b = r × b`.
+/// Skew matrix `[r]x` with `[r]x b = r × b`, in the unit and axes of r.
+///
+/// ```text
+///         [  0   -z    y ]
+/// [r]x =  [  z    0   -x ]
+///         [ -y    x    0 ]
+/// ```
 #[inline(always)]
 pub fn skew<T: Real>(r: &Vector3<T>) -> Matrix3<T> {
     let zero = T::zero();
     Matrix3::new(zero, -r.z, r.y, r.z, zero, -r.x, -r.y, r.x, zero)
 }
 
-/// `Ad_AB = [[R, [p]x R], [0, R]]` for `X_AB`: maps a twist from B to A.
+/// Twist map `Ad_AB`, 6×6, linear part first, from Bo, B axes to Ao, A axes.
 ///
-/// Wrenches transform in the opposite direction with the transpose: `F_B = Ad_ABᵀ F_A`.
+/// ```text
+/// Ad_AB = [ R_AB   [p]x R_AB ]      V_A = Ad_AB V_B,   F_B = Ad_ABᵀ F_A,   p = p_AoBo_A
+///         [  0       R_AB    ]
+/// ```
+/// * `X_AB`: pose of B in A, m; both frames are fixed to the same body.
 pub fn adjoint(X_AB: &Pose) -> Matrix6<f64> {
     let R = X_AB.rotation.matrix();
     let mut Ad = Matrix6::zeros();
@@ -203,25 +255,36 @@ impl SpatialInertia {
         Self { mass: 0.0, first_moment: Vector3::zeros(), rotational: Matrix3::zeros() }
     }
 
-    /// Creates it from mass (kg), centre of mass `p_BoBcm_B` (m) and inertia about the centre of
-    /// mass, in B axes (kg m²).
+    /// Creates it from the mass properties of a body.
+    ///
+    /// ```text
+    /// h = m c,   I = I_cm - m [c]x²      c = p_BoBcm_B
+    /// ```
+    /// * `mass`: kg.
+    /// * `com`: `p_BoBcm_B`, m.
+    /// * `inertia_com`: `I_cm` about the centre of mass, in B axes, kg·m².
     pub fn from_com(mass: f64, com: &Vector3<f64>, inertia_com: &Matrix3<f64>) -> Self {
         let c = skew(com);
         Self { mass, first_moment: com * mass, rotational: inertia_com - c * c * mass }
     }
 
-    /// Centre of mass `p_BoBcm_B` (m); zero for a massless body.
+    /// Centre of mass `p_BoBcm_B = h/m` (m); zero for a massless body.
     pub fn com(&self) -> Vector3<f64> {
         if self.mass == 0.0 { Vector3::zeros() } else { self.first_moment / self.mass }
     }
 
-    /// Inertia about the centre of mass, in B axes (kg m²).
+    /// Inertia about the centre of mass, in B axes: `I + m [c]x²`, `c = p_BoBcm_B` (kg m²).
     pub fn inertia_com(&self) -> Matrix3<f64> {
         let c = skew(&self.com());
         self.rotational + c * c * self.mass
     }
 
-    /// Converts to a 6×6 matrix, linear part first: `[[m 1, -[h]x], [[h]x, I]]`.
+    /// Converts to the 6×6 matrix about Bo, in B axes, linear part first.
+    ///
+    /// ```text
+    /// M_BBo_B = [ m 1   -[h]x ]      h = m p_BoBcm_B,   units kg, kg·m; kg·m, kg·m²
+    ///           [ [h]x    I   ]
+    /// ```
     pub fn to_matrix(&self) -> Matrix6<f64> {
         let h = skew(&self.first_moment);
         let mut M = Matrix6::zeros();
@@ -234,7 +297,12 @@ impl SpatialInertia {
 }
 
 impl<T: Real> SpatialInertia<T> {
-    /// Momentum (or inertia force) `M V`.
+    /// Momentum `M V` (kg m/s, kg m²/s), or `M A` (N, N m), at Bo, in B axes.
+    ///
+    /// ```text
+    /// M V = [m v - h × w; h × v + I w],   h = m p_BoBcm_B
+    /// ```
+    /// * `V`: twist or spatial acceleration of the body at Bo, in B axes.
     #[inline(always)]
     pub fn mul_twist(&self, V: &Twist<T>) -> Wrench<T> {
         let h = &self.first_moment;
@@ -244,25 +312,34 @@ impl<T: Real> SpatialInertia<T> {
         )
     }
 
-    /// Inertia of the same body about Ao in A axes, for `X_AB`.
+    /// Inertia of the same body about Ao in A axes, `Ad_BAᵀ M_BBo_B Ad_BA`.
+    ///
+    /// * `X_AB`: pose of B in A, m.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose<T>) -> SpatialInertia<T> {
         self.turned(X_AB.rotation.matrix()).shifted(&X_AB.translation.vector)
     }
 
-    /// Inertia in A axes, for `R_AB`.
+    /// Inertia of the same body about the same point, from B axes to A axes.
+    ///
+    /// * `R`: `R_AB`.
     #[inline(always)]
     pub fn turned(&self, R: &Matrix3<T>) -> SpatialInertia<T> {
         let Self { mass, first_moment, rotational } = self;
         SpatialInertia { mass: *mass, first_moment: mul(R, first_moment), rotational: turn_symmetric(R, rotational) }
     }
 
-    /// Inertia about another point, relative to which the current point is at p.
+    /// Inertia of the same body about another point Ao, in the same axes.
+    ///
+    /// ```text
+    /// h_A = h + m p,   I_A = I + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
+    /// ```
+    /// * `p`: `p_AoBo` from the new point to the present one, in the axes of the inertia, m.
     #[inline(always)]
     pub fn shifted(&self, p: &Vector3<T>) -> SpatialInertia<T> {
         let h = &self.first_moment;
         let (half, two) = (T::splat(0.5), T::splat(2.0));
-        // I_A = I_B + (2 p·h + m p·p) 1 - (p hᵀ + h pᵀ + m p pᵀ)
+        // With k = h + m p/2 the change of I is 2 p·k 1 - (p kᵀ + k pᵀ).
         let k = add(h, &scaled(p, self.mass * half));
         let (x, y, z) = (p.x * two * k.x, p.y * two * k.y, p.z * two * k.z);
         let (xy, xz, yz) = (p.x * k.y + k.x * p.y, p.x * k.z + k.x * p.z, p.y * k.z + k.y * p.z);
@@ -291,7 +368,8 @@ impl<T: Real> AddAssign for SpatialInertia<T> {
     }
 }
 
-/// Articulated-body inertia: symmetric 6×6 matrix `[[A, B], [Bᵀ, C]]` stored as three blocks.
+/// Articulated-body inertia at Bo, in B axes: symmetric 6×6 matrix `[[A, B], [Bᵀ, C]]` stored as
+/// three blocks, linear part first.
 #[derive(Clone, Copy, Debug)]
 pub struct ArticulatedInertia {
     /// Linear-linear block.
@@ -303,13 +381,15 @@ pub struct ArticulatedInertia {
 }
 
 impl ArticulatedInertia {
-    /// Articulated inertia of a single rigid body.
+    /// Articulated inertia of a single rigid body: `M_BBo_B` as three blocks.
     #[inline(always)]
     pub fn from_rigid(M: &SpatialInertia) -> Self {
         Self { linear: Matrix3::from_diagonal_element(M.mass), coupling: -skew(&M.first_moment), angular: M.rotational }
     }
 
-    /// `I V`.
+    /// Product `[A v + B w; Bᵀ v + C w]` with a twist or acceleration `[v; w]` at Bo, in B axes.
+    ///
+    /// Returns a wrench (or momentum) at Bo, in B axes.
     #[inline(always)]
     pub fn mul_twist(&self, V: &Twist) -> Wrench {
         Wrench::new(
@@ -318,7 +398,13 @@ impl ArticulatedInertia {
         )
     }
 
-    /// `I ← I - F Fᵀ s`.
+    /// Subtracts `s F Fᵀ`: releases a joint axis.
+    ///
+    /// * `F`: `I S` of the axis S, at Bo, in B axes.
+    /// * `s`: `1/(Sᵀ I S)`; then S moves freely: `(I - s F Fᵀ) S = 0`.
+    ///
+    /// # Source
+    /// [Featherstone 2008], Table 7.1, for one joint coordinate.
     #[inline(always)]
     pub fn rank_one_update(&mut self, F: &Wrench, s: f64) {
         let (f, t) = (F.force * s, F.torque * s);
@@ -328,7 +414,13 @@ impl ArticulatedInertia {
         self.angular -= outer(&t, &F.torque);
     }
 
-    /// Inertia about Ao in A axes, for `X_AB`.
+    /// Articulated inertia about Ao in A axes, `Ad_BAᵀ I Ad_BA`.
+    ///
+    /// ```text
+    /// A' = R A Rᵀ,   B' = R B Rᵀ - A' [p]x      R = R_AB,   p = p_AoBo_A
+    /// C' = R C Rᵀ + [p]x B' - (R B Rᵀ)ᵀ [p]x
+    /// ```
+    /// * `X_AB`: pose of B in A, m.
     #[inline(always)]
     pub fn at_parent(&self, X_AB: &Pose) -> Self {
         let R = X_AB.rotation.matrix();

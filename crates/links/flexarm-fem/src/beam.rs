@@ -39,7 +39,8 @@ impl BeamTheory {
     }
 }
 
-/// Straight uniform beam from A to B.
+/// Straight uniform beam from A to B along x of its axes E; section at its centroid, principal axes
+/// y and z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beam {
     bar: Bar,
@@ -49,7 +50,7 @@ pub struct Beam {
     shear_z: f64,
 }
 
-/// One bending plane: rows of its deflection and rotation, and the sign of the rotation.
+/// One bending plane: xy with the deflection v and `theta_z`, or xz with w and `theta_y`.
 struct Plane {
     /// Row numbers of the deflection and the rotation at A, then at B.
     rows: [usize; 4],
@@ -91,6 +92,7 @@ impl Beam {
         self.length
     }
 
+    /// The two bending planes, xy and xz, with `φ = 12 EI/(kGA l²)` of each.
     fn planes(&self) -> [Plane; 2] {
         let l = self.length;
         let plane = |w: usize, theta: usize, sign, EI: f64, rotary, shear: f64| Plane {
@@ -156,17 +158,26 @@ impl Beam {
         K
     }
 
-    /// Stiffness `K_BB` of the end B with A clamped, 6×6, at B, beam axes.
+    /// Stiffness of the end B with A clamped: the distal block of [`Self::stiffness12`].
+    ///
+    /// ```text
+    /// F_B = K_BB u_B,   K_BB = C_BB⁻¹
+    /// ```
+    /// Returns `K_BB`, 6×6 (N/m, N/rad; N·m/m, N·m/rad), at Bo, beam axes, exactly symmetric.
     pub fn tip_stiffness(&self) -> Matrix6<f64> {
         self.stiffness12().fixed_view::<6, 6>(6, 6).into_owned()
     }
 
-    /// Compliance `C_BB` of the end B with A clamped, 6×6, at B, beam axes.
+    /// Compliance of the end B with A clamped, `u_B = C_BB F_B`.
     ///
     /// ```text
     /// stretch  F l/EA            bending by a force   F l³/(3EI) + F l/(kGA),   slope F l²/(2EI)
     /// twist    T l/GJ            bending by a moment  M l²/(2EI),               slope M l/EI
     /// ```
+    /// Returns `C_BB`, 6×6 (m/N, m/(N·m); rad/N, rad/(N·m)), at Bo, beam axes, exactly symmetric.
+    ///
+    /// # Source
+    /// Castigliano's theorem with the constant section forces of a load at B; [Przemieniecki 1968].
     pub fn tip_compliance(&self) -> Matrix6<f64> {
         let (bar, l) = (&self.bar, self.length);
         let mut C = Matrix6::zeros();
@@ -195,12 +206,14 @@ impl Beam {
         let l = self.length;
         let mut M = Matrix12::zeros();
         let polar = self.bar.rotary_y + self.bar.rotary_z;
+        // Tension and torsion have linear shapes: m/3 at each end, m/6 between the ends.
         for (row, m) in [(0, self.bar.mass_per_length * l), (3, polar * l)] {
             M[(row, row)] = m / 3.0;
             M[(row + 6, row + 6)] = m / 3.0;
             M[(row, row + 6)] = m / 6.0;
             M[(row + 6, row)] = m / 6.0;
         }
+        // Bending in each plane: translation and rotary inertia of the sections, by quadrature.
         for plane in self.planes() {
             let mut m = Matrix4::zeros();
             for (xi, weight) in gauss4() {
@@ -219,7 +232,9 @@ impl Beam {
         &self.bar
     }
 
-    /// Shape functions of the section at `xi = x/l` over the twelve end displacements.
+    /// Motion of the section at `xi = x/l` per end displacement `[u_A; u_B]`, beam axes.
+    ///
+    /// Returns 3×12 matrices: `u` and `theta` of the section, and their derivatives by x.
     pub(crate) fn section_at(&self, xi: f64) -> SectionShapes {
         let l = self.length;
         let mut s = SectionShapes::default();
@@ -246,10 +261,17 @@ impl Beam {
         s
     }
 
-    /// Mass, centre of mass and inertia of the piece between the fractions `from` and `to`.
+    /// Mass, centre of mass and inertia of the piece between two sections.
     ///
-    /// Treats the piece as a uniform bar with the rotary inertia of its section; beam axes, origin
-    /// at A.
+    /// ```text
+    /// m = μ l,   I_xx = (μ_y + μ_z) l,   I_yy = m l²/12 + μ_y l,   I_zz = m l²/12 + μ_z l
+    /// ```
+    /// with the mass μ, the rotary inertias `μ_y`, `μ_z` of the section per length and the length l
+    /// of the piece.
+    ///
+    /// * `from`, `to`: bounds of the piece as fractions of the length, from A.
+    ///
+    /// Returns mass (kg), centre of mass from A (m) and inertia about it (kg·m²), beam axes.
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] unless `0 <= from < to <= 1`.
@@ -289,7 +311,10 @@ impl Plane {
         }
     }
 
-    /// Deflection and rotation of the section at `xi = x/l` per (w_A, theta_A, w_B, theta_B).
+    /// Deflection N and rotation `N_theta` of the section at `xi = x/l` per (w_A, theta_A, w_B,
+    /// theta_B), where theta is dw/dx without shear.
+    ///
+    /// Source: [Friedman & Kosmatka 1993], exact for end loads.
     fn shapes(&self, xi: f64, l: f64) -> (Vector4<f64>, Vector4<f64>) {
         let phi = self.phi;
         let (x2, x3) = (xi * xi, xi * xi * xi);

@@ -12,7 +12,11 @@ use crate::reduced::{ElasticSplit, stiffness_at_split};
 use flexarm_spatial::Pose;
 
 impl BeamLink {
-    /// Splits the beam into a chain of `parts` rigid parts, link axes.
+    /// Splits the beam into a chain of rigid parts in closed form.
+    ///
+    /// * `parts`: number of rigid parts, 2 or more.
+    ///
+    /// Returns the chain; poses and parts in link axes, `K_S` in beam axes.
     ///
     /// # Errors
     /// As [`BeamLink::reduce`], and [`FemError::OutOfRange`] for fewer than two parts.

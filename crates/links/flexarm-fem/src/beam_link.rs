@@ -52,6 +52,8 @@ const ACROSS: f64 = 0.1;
 
 impl BeamLink {
     /// Beam along link x from A at the link origin to B, cut in the middle, Timoshenko's theory.
+    ///
+    /// * `length`: of the beam, and from A to B, m; checked by [`Self::reduce`].
     pub fn new(name: impl Into<String>, section: Section, material: Material, length: f64) -> Self {
         Self {
             name: name.into(),
@@ -101,6 +103,9 @@ impl BeamLink {
 
     /// Reduces the link in closed form.
     ///
+    /// Returns the link with `K_BB` at Bo, link axes, and the two parts of the cut beam. `K_BB` is
+    /// exact for every wrench at B.
+    ///
     /// # Errors
     /// [`FemError::OutOfRange`] for impossible dimensions, materials, fractions and masses,
     /// [`FemError::Missing`] for a section without shear stiffness in Timoshenko's theory, and the
@@ -127,7 +132,9 @@ impl BeamLink {
         Beam::new(self.section.bar(&self.material)?, self.theory, self.length)
     }
 
-    /// Stiffness of the distal beam end, transferred over the rigid arm to Bo, link axes.
+    /// Stiffness of the distal beam end E2, transferred over the rigid arm to Bo.
+    ///
+    /// Returns `K_BB = Ad_E2Bᵀ K_E2E2 Ad_E2B`, 6×6 (N/m, N/rad; N·m/m, N·m/rad), at Bo, link axes.
     pub(crate) fn tip_stiffness(&self) -> Result<Matrix6<f64>, FemError> {
         let X_LE2 = self.X_LE * Pose::translation(self.length, 0.0, 0.0);
         let Ad_E2B = adjoint(&(X_LE2.inverse() * Pose::from(self.X_LB.translation)));

@@ -20,7 +20,7 @@
 //! Source: Castigliano's theorem for `C_BB`; sharing by energy is our own.
 //!
 //! Start at `ChainSource::chain`. Link axes; compliances in m/N to rad/(N·m). Not here: chains of
-//! a beam in closed form (`beam_chain`), the volume of cut elements ([`crate::cut`]).
+//! a beam in closed form (`beam_chain`), the volume of cut elements ([`cut`](crate::cut())).
 
 use flexarm_spatial::{Pose, adjoint, skew, symmetric_part};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix, Vector3, Vector6};
@@ -79,10 +79,11 @@ pub enum ChainError {
 /// * `U`: displacements of all DoF under the six unit wrenches at B, A clamped.
 /// * `planes`: n - 1 planes between the n slices, from A to B.
 ///
-/// Returns one 6×6 compliance per slice, m/N to rad/(N·m), at Bo, link axes; their sum is `C_BB`.
+/// Returns one 6×6 compliance per slice (m/N, m/(N·m); rad/N, rad/(N·m)), at Bo, link axes; their
+/// sum is `C_BB`. Invalid elements, which the assembly rejects, are left out.
 ///
-/// # Errors
-/// None: elements were checked when they were assembled.
+/// # Panics
+/// If `U` has fewer than six columns, or fewer rows than the model has DoF.
 pub fn energy_by_slice(
     mesh: &Mesh,
     model: &FeModel,
@@ -98,7 +99,8 @@ pub fn energy_by_slice(
         for nodes in block.elements() {
             let x: Vec<_> = nodes.iter().map(|node| mesh.nodes[*node as usize]).collect();
             let size = per_node * nodes.len();
-            let u = DMatrix::from_fn(size, 6, |i, j| {
+            // u_e: displacements of the element's nodes under each unit load.
+            let u_e = DMatrix::from_fn(size, 6, |i, j| {
                 U[(model.dofs.of(nodes[i / per_node] as usize).start + i % per_node, j)]
             });
             let material = &materials[block.region];
@@ -111,8 +113,8 @@ pub fn energy_by_slice(
                     .map(|()| DMatrix::from_column_slice(size, size, workspace.stiffness()))
             };
             let Some(K_e) = K_e else { continue };
-            // Energy of pairs of unit loads, u_iᵀ K_e u_j, shared among the slices by volume.
-            let energy = u.transpose() * K_e * &u;
+            // Energy of pairs of unit loads, u_eᵀ K_e u_e, shared among the slices by volume.
+            let energy = u_e.transpose() * K_e * &u_e;
             let energy = Loads::from_fn(|i, j| energy[(i, j)]);
             // Inverted elements were rejected when the model was assembled.
             let Ok(shares) = volume_fractions(block.kind, &x, planes) else { continue };
@@ -124,21 +126,26 @@ pub fn energy_by_slice(
     slices.iter().map(symmetric_part).collect()
 }
 
-/// Centre of compliance of a 6×6 compliance given at `p_B`: the point where the coupling block is
-/// symmetric, so that coupling is minimal. For a straight uniform beam this is its middle.
+/// Centre of compliance S: the point where the coupling block is symmetric, so that coupling is
+/// minimal. For a straight uniform beam this is its middle.
 ///
 /// ```text
 /// C_tr(S) = C_tr(B) - [p_BS]x C_rr,   skew part of C_tr(S) = 0:   three equations for S
 /// ```
-/// Source: Lončarić (1987), normal forms of stiffness and compliance matrices.
-pub(crate) fn centre_of_compliance(C: &Matrix6<f64>, p_B: &Vector3<f64>) -> Option<Vector3<f64>> {
-    let C_tr = C.fixed_view::<3, 3>(0, 3).into_owned();
-    let C_rr = C.fixed_view::<3, 3>(3, 3).into_owned();
-    // u_S = u_B + theta x p_BS = u_B - [p]x theta, so C_tr(S) = C_tr - [p]x C_rr. The axial vector
-    // of [p]x C_rr is (tr(C_rr) 1 - C_rr) p.
+/// * `C_BB`: 6×6 compliance at Bo (m/N, m/(N·m); rad/N, rad/(N·m)), link axes.
+/// * `p_LB`: position of Bo, link axes, m.
+///
+/// Returns `p_LS`, link axes, m; `None` if the rotational block is singular.
+///
+/// Source: [Lončarić 1987].
+pub(crate) fn centre_of_compliance(C_BB: &Matrix6<f64>, p_LB: &Vector3<f64>) -> Option<Vector3<f64>> {
+    let C_tr = C_BB.fixed_view::<3, 3>(0, 3).into_owned();
+    let C_rr = C_BB.fixed_view::<3, 3>(3, 3).into_owned();
+    // u_S = u_B + θ × p_BS = u_B - [p]x θ, so C_tr(S) = C_tr - [p]x C_rr. Twice the axial vector of
+    // [p]x C_rr is (tr(C_rr) 1 - C_rr) p.
     let axial = |A: &Matrix3<f64>| Vector3::new(A[(2, 1)] - A[(1, 2)], A[(0, 2)] - A[(2, 0)], A[(1, 0)] - A[(0, 1)]);
     let matrix = Matrix3::identity() * C_rr.trace() - C_rr;
-    matrix.try_inverse().map(|inverse| p_B + inverse * axial(&C_tr))
+    matrix.try_inverse().map(|inverse| p_LB + inverse * axial(&C_tr))
 }
 
 /// Inputs for cutting a mesh into a chain.
@@ -161,18 +168,24 @@ pub(crate) struct ChainSource<'a> {
 }
 
 impl ChainSource<'_> {
+    /// Plane across AB at a fraction of the way from A to B.
     fn plane(&self, fraction: f64) -> CutPlane {
         let normal = self.p_LB - self.p_LA;
         CutPlane { point: self.p_LA + normal * fraction, normal }
     }
 
     /// Position of a point along AB, as a fraction.
-    fn fraction(&self, p: &Vector3<f64>) -> f64 {
-        let along = self.p_LB - self.p_LA;
-        (p - self.p_LA).dot(&along) / along.norm_squared()
+    fn fraction(&self, p_L: &Vector3<f64>) -> f64 {
+        let p_AB = self.p_LB - self.p_LA;
+        (p_L - self.p_LA).dot(&p_AB) / p_AB.norm_squared()
     }
 
-    /// Splits the mesh into a chain of `parts` parts.
+    /// Splits the mesh into a chain.
+    ///
+    /// * `parts`: number of rigid parts, 2 or more.
+    ///
+    /// Returns `parts - 1` joints, one per slice of AB of equal length, and the parts between cuts
+    /// through the joints.
     ///
     /// # Errors
     /// [`ChainError`].
@@ -180,6 +193,7 @@ impl ChainSource<'_> {
         if parts < 2 {
             return Err(ChainError::TooFewParts { parts });
         }
+        // E: share of C_BB of each slice, at Bo.
         let slices = parts - 1;
         let bound = |k: usize| k as f64 / slices as f64;
         let between: Vec<CutPlane> = (1..slices).map(|k| self.plane(bound(k))).collect();
@@ -198,9 +212,9 @@ impl ChainSource<'_> {
             });
             let p_LS = centre.unwrap_or(middle);
             let X_LS = Pose::translation(p_LS.x, p_LS.y, p_LS.z);
-            let p = self.p_LB - p_LS;
-            // Maps twists from Bo to So, same axes.
-            let Ad_SB = adjoint(&Pose::translation(p.x, p.y, p.z));
+            // C_S = Ad_SB E Ad_SBᵀ, S in link axes; then K_S = C_S⁻¹ on a unit diagonal.
+            let p_SB = self.p_LB - p_LS;
+            let Ad_SB = adjoint(&Pose::translation(p_SB.x, p_SB.y, p_SB.z));
             let C_S = symmetric_part(&(Ad_SB * E * Ad_SB.transpose()));
             let scale = C_S.diagonal().map(|c| 1.0 / c.sqrt());
             let scaled = C_S.component_mul(&(scale * scale.transpose()));
@@ -215,45 +229,58 @@ impl ChainSource<'_> {
 }
 
 impl Chain {
-    /// Maps from joint coordinates to displacement twists at the link origin:
-    /// `xi_i = Σ_{k<i} Ad_{LS_k} d_k` for part i.
+    /// Maps from joint displacements `d_k` at `S_k` to displacement twists at Lo, link axes: part i
+    /// moves by `Σ_{k<i} Ad_{LS_k} d_k`. Returns one `Ad_LS` per joint.
     fn carries(&self) -> Vec<Matrix6<f64>> {
         self.joints.iter().map(|joint| adjoint(&joint.X_LS)).collect()
     }
 
-    /// Compliance at B with A clamped, link axes: `Σ Ad_{BS} C_S Ad_{BS}ᵀ`.
+    /// Compliance at B with A clamped: the sum over the joints.
+    ///
+    /// ```text
+    /// C_BB = Σ_k Ad_BS K_S⁻¹ Ad_BSᵀ
+    /// ```
+    /// * `p_LB`: position of Bo, link axes, m.
+    ///
+    /// Returns `C_BB`, 6×6 (m/N, m/(N·m); rad/N, rad/(N·m)), at Bo, link axes; `None` if a `K_S` is
+    /// not positive definite.
     pub fn tip_compliance(&self, p_LB: &Vector3<f64>) -> Option<Matrix6<f64>> {
-        let mut C = Matrix6::zeros();
+        let mut C_BB = Matrix6::zeros();
         for joint in &self.joints {
             let X_BS = Pose::translation(-p_LB.x, -p_LB.y, -p_LB.z) * joint.X_LS;
             let Ad_BS = adjoint(&X_BS);
-            let K = DMatrix::from_column_slice(6, 6, joint.K_S.as_slice());
-            let C_S = crate::reduction::spd_inverse(&K)?;
-            C += Ad_BS * Matrix6::from_column_slice(C_S.as_slice()) * Ad_BS.transpose();
+            let K_S = DMatrix::from_column_slice(6, 6, joint.K_S.as_slice());
+            let C_S = crate::reduction::spd_inverse(&K_S)?;
+            C_BB += Ad_BS * Matrix6::from_column_slice(C_S.as_slice()) * Ad_BS.transpose();
         }
-        Some(C)
+        Some(C_BB)
     }
 
-    /// Stiffness and mass over the joint coordinates, A clamped: `K = blkdiag(K_S)`,
-    /// `M = Σ J_iᵀ M_i J_i`.
+    /// Stiffness and mass over the joint displacements, six per joint in its axes, A clamped.
+    ///
+    /// ```text
+    /// K = blkdiag(K_S),   M_kl = Ad_LS_kᵀ (Σ M_iLo_L of the parts beyond both joints) Ad_LS_l
+    /// ```
     pub(crate) fn held_matrices(&self) -> (DMatrix<f64>, DMatrix<f64>) {
         let (n, carries) = (6 * self.joints.len(), self.carries());
         let (mut K, mut M) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n));
         for (k, joint) in self.joints.iter().enumerate() {
             K.view_mut((6 * k, 6 * k), (6, 6)).copy_from(&joint.K_S);
         }
-        for (a, Ad_a) in carries.iter().enumerate() {
-            for (b, Ad_b) in carries.iter().enumerate() {
+        for (k, Ad_LSk) in carries.iter().enumerate() {
+            for (l, Ad_LSl) in carries.iter().enumerate() {
                 // The parts beyond the farther joint are moved by both joints.
-                let beyond = self.parts.iter().skip(a.max(b) + 1);
-                let inertia: Matrix6<f64> = beyond.map(RigidPart::spatial_inertia).sum();
-                M.view_mut((6 * a, 6 * b), (6, 6)).copy_from(&(Ad_a.transpose() * inertia * Ad_b));
+                let beyond = self.parts.iter().skip(k.max(l) + 1);
+                let M_Lo: Matrix6<f64> = beyond.map(RigidPart::spatial_inertia).sum();
+                M.view_mut((6 * k, 6 * l), (6, 6)).copy_from(&(Ad_LSk.transpose() * M_Lo * Ad_LSl));
             }
         }
         (K, M)
     }
 
-    /// Natural frequencies with A clamped, Hz, ascending.
+    /// Natural frequencies with A clamped, Hz, ascending, six per joint.
+    ///
+    /// Empty if the mass of the parts is not positive definite.
     pub fn held_frequencies_hz(&self) -> Vec<f64> {
         let (K, M) = self.held_matrices();
         generalised_frequencies(&K, &M)
@@ -261,24 +288,30 @@ impl Chain {
 
     /// Static deflection of B under the weight of the link, A clamped.
     ///
+    /// ```text
+    /// u_B = Σ_k Ad_BS K_S⁻¹ Ad_LSᵀ F_Lo      F_Lo: weight of the parts beyond joint k
+    /// ```
+    /// * `p_LB`: position of Bo, link axes, m.
     /// * `gravity`: m/s², link axes.
     ///
-    /// Returns the displacement twist at Bo, link axes.
+    /// Returns displacement and rotation of B (m, rad) at Bo, link axes; `None` if a `K_S` is not
+    /// positive definite.
     pub fn sag(&self, p_LB: &Vector3<f64>, gravity: &Vector3<f64>) -> Option<Vector6<f64>> {
-        let mut u = Vector6::zeros();
+        let mut u_B = Vector6::zeros();
         for (k, joint) in self.joints.iter().enumerate() {
             let Ad_LS = adjoint(&joint.X_LS);
-            let mut weight = Vector6::zeros();
+            let mut F_Lo = Vector6::zeros();
             for part in self.parts.iter().skip(k + 1) {
                 let f = gravity * part.mass;
                 let t = skew(&part.com) * f;
-                weight += Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z);
+                F_Lo += Vector6::new(f.x, f.y, f.z, t.x, t.y, t.z);
             }
-            let K = DMatrix::from_column_slice(6, 6, joint.K_S.as_slice());
-            let C_S = Matrix6::from_column_slice(crate::reduction::spd_inverse(&K)?.as_slice());
-            let d = C_S * (Ad_LS.transpose() * weight);
-            u += adjoint(&(Pose::translation(-p_LB.x, -p_LB.y, -p_LB.z) * joint.X_LS)) * d;
+            let K_S = DMatrix::from_column_slice(6, 6, joint.K_S.as_slice());
+            let C_S = Matrix6::from_column_slice(crate::reduction::spd_inverse(&K_S)?.as_slice());
+            // Displacement of the joint, then of B by the joint.
+            let d_S = C_S * (Ad_LS.transpose() * F_Lo);
+            u_B += adjoint(&(Pose::translation(-p_LB.x, -p_LB.y, -p_LB.z) * joint.X_LS)) * d_S;
         }
-        Some(u)
+        Some(u_B)
     }
 }

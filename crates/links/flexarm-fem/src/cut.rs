@@ -98,7 +98,7 @@ pub enum CutError {
     },
 }
 
-/// Checked plane: `distance = normal · (x - point)`.
+/// Checked plane: `distance = normal · (x - point)`, positive ahead; mesh axes, m.
 #[derive(Debug, Clone, Copy)]
 struct Plane {
     normal: Vector3<f64>,
@@ -115,6 +115,7 @@ impl Plane {
         }
     }
 
+    /// Signed distance of a point (m, mesh axes) if the normal is a unit vector.
     fn distance(&self, x: &Vector3<f64>) -> f64 {
         self.normal.dot(&(x - self.point))
     }
@@ -127,6 +128,8 @@ impl Plane {
 ///
 /// * `densities`: one per region, kg/m³. A beam section given by stiffness and mass per length
 ///   ([`Section::Given`](crate::Section::Given)) keeps its own mass.
+///
+/// Returns mass (kg), centre of mass (m) and inertia about it (kg·m²), mesh axes.
 ///
 /// # Errors
 /// As [`cut`].
@@ -147,6 +150,9 @@ pub fn mass_properties(mesh: &Mesh, densities: &[f64]) -> Result<RigidPart, CutE
 /// Beams are cut perpendicular to their axis.
 ///
 /// * `densities`: as in [`mass_properties`].
+/// * `planes`: mesh axes, m, from proximal to distal.
+///
+/// Returns one part more than there are planes, as in [`mass_properties`].
 ///
 /// # Errors
 /// [`CutError`] if the input is invalid, an element is inverted, or a part is empty.
@@ -172,8 +178,12 @@ pub fn cut(mesh: &Mesh, densities: &[f64], planes: &[CutPlane]) -> Result<Vec<Ri
     Ok(parts)
 }
 
-/// Share of the volume of an element (of the length for a beam) in each part, `planes.len() + 1`
-/// numbers that add up to one.
+/// Share of the volume of an element (of the length for a beam) in each part.
+///
+/// * `x`: positions of its nodes, in the order of [`ElementKind`], m.
+/// * `planes`: same axes as x, from proximal to distal; the length of the normals does not matter.
+///
+/// Returns `planes.len() + 1` numbers that add up to one.
 ///
 /// Costs one dot product per node and plane if no plane crosses the element.
 ///
@@ -229,6 +239,7 @@ fn weigh(mesh: &Mesh, densities: &[f64], planes: &[Plane]) -> Result<(Moments, V
         let region = &mesh.regions[block.region];
         let density =
             positive("density (kg/m3)", densities[block.region]).map_err(|source| in_region(region, source))?;
+        // Each element counts to the whole, and ahead of a plane with all or with its cut piece.
         let mut x = Vec::with_capacity(block.kind.nodes());
         for (element, id) in block.elements().zip(&block.ids) {
             x.clear();

@@ -22,7 +22,9 @@ pub struct LinkFrames {
 }
 
 impl LinkFrames {
-    /// Creates frames with S midway between A and B, in link axes.
+    /// Creates frames with S midway between A and B, with link axes.
+    ///
+    /// * `X_LA`, `X_LB`: poses of the interfaces in the link frame, m.
     pub fn new(X_LA: Pose, X_LB: Pose) -> Self {
         Self { X_LA, X_LB, X_LS: Pose::identity() }.with_split_fraction(0.5)
     }
@@ -35,19 +37,21 @@ impl LinkFrames {
     }
 
     /// Places S at any pose.
+    ///
+    /// * `X_LS`: pose of S in the link frame, m.
     pub fn with_split(self, X_LS: Pose) -> Self {
         Self { X_LS, ..self }
     }
 
-    /// Vector from A to B, link axes, m.
+    /// Vector `p_AoBo_L` from A to B, link axes, m.
     pub fn p_AB(&self) -> Vector3<f64> {
         self.X_LB.translation.vector - self.X_LA.translation.vector
     }
 
     /// Pose of S in the frame with origin Bo and link axes, the frame of `K_BB`.
     pub(crate) fn X_BS(&self) -> Pose {
-        let p = self.X_LB.translation.vector;
-        Pose::translation(-p.x, -p.y, -p.z) * self.X_LS
+        let p_LB = self.X_LB.translation.vector;
+        Pose::translation(-p_LB.x, -p_LB.y, -p_LB.z) * self.X_LS
     }
 
     /// Rejects frames farther from the link origin than [`LONGEST_LINK`].

@@ -6,10 +6,13 @@
 //!
 //! ```text
 //! asymmetry            max |k_ij - k_ji| / (s_i s_j)
-//! rigid_body_residual  max |(K R)_im| / (s_i Σ_k s_k |R_km|),  R: six rigid motions about the middle of AB
+//! rigid_body_residual  max |(K R)_im| / (s_i Σ_k s_k |R_km|)
 //! block_identity       K_AA - Adᵀ K_BB Ad and K_AB + Adᵀ K_BB, over the size of their terms
-//! min_eigenvalue       smallest eigenvalue of k_ij/(s_i s_j) of K_BB; condition: largest over smallest
+//! min_eigenvalue       smallest eigenvalue of k_ij/(s_i s_j) of K_BB
+//! condition            largest over smallest eigenvalue of the same matrix
 //! ```
+//! R: the six rigid motions about the middle of AB.
+//!
 //! A positive definite `K_BB` together with the block identity implies that the 12×12 has exactly
 //! six zero and six positive eigenvalues, so these are not counted separately.
 //!
@@ -63,7 +66,8 @@ pub struct GateReport {
 }
 
 impl GateReport {
-    /// Returns warnings about measures that pass but are unusually large.
+    /// Returns warnings about measures that pass but are unusually large: one sentence per measure
+    /// above [`GateLimits::rigid_body_warning`].
     pub fn warnings(&self, limits: &GateLimits) -> Vec<String> {
         [("rigid-body residual", self.rigid_body_residual), ("disagreement of the blocks", self.block_identity)]
             .into_iter()
@@ -77,9 +81,12 @@ impl GateReport {
     }
 }
 
-/// Checks a 12×12 stiffness (A, then B, link axes) and returns its `K_BB`, made exactly symmetric.
+/// Checks the stiffness of both interfaces.
 ///
+/// * `K`: `F = K [u_A; u_B]`, 12×12 (N/m, N/rad; N·m/m, N·m/rad), at Ao and Bo, link axes.
 /// * `p_AB`: vector from A to B, link axes, m.
+///
+/// Returns the block `K_BB`, made exactly symmetric, and the measures of the module.
 ///
 /// # Errors
 /// In this order: [`FemError::NotFinite`], [`FemError::NotPositiveDefinite`] (a diagonal entry that
@@ -126,10 +133,12 @@ pub fn check_matrix12(
     Ok((K_BB, report))
 }
 
-/// Checks a 6×6 stiffness (one interface with the other clamped, or an elastic joint) and returns
-/// it made exactly symmetric.
+/// Checks the stiffness of one interface with the other clamped, or of an elastic joint.
 ///
 /// * `what`: name of the matrix in messages.
+/// * `K`: 6×6 (N/m, N/rad; N·m/m, N·m/rad), at any point, in any axes.
+///
+/// Returns K, made exactly symmetric, and the measures that do not need a second interface.
 ///
 /// # Errors
 /// [`FemError::NotFinite`], [`FemError::NotSymmetric`], [`FemError::NotPositiveDefinite`].
@@ -147,6 +156,7 @@ pub fn check_matrix6(
     Ok((K, report))
 }
 
+/// Rejects the first entry that is not finite.
 fn check_finite<const N: usize>(what: &'static str, K: &SMatrix<f64, N, N>) -> Result<(), FemError> {
     for row in 0..N {
         for column in 0..N {
@@ -176,6 +186,7 @@ fn diagonal_scale<const N: usize>(
     Ok(diagonal.map(f64::sqrt))
 }
 
+/// Maximum of `|k_ij - k_ji|/(s_i s_j)`; an error if it is above the limit or NaN.
 fn check_symmetry<const N: usize>(
     what: &'static str,
     K: &SMatrix<f64, N, N>,
@@ -237,6 +248,8 @@ struct RigidResidual {
     row: String,
 }
 
+/// Maximum force `|(K R)_im|/(s_i Σ_k s_k |R_km|)` over rows i and rigid motions m, as in the
+/// module.
 fn rigid_body_residual(K: &Matrix12, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) -> RigidResidual {
     const MOTIONS: [&str; 6] = [
         "translation along x",
@@ -246,11 +259,12 @@ fn rigid_body_residual(K: &Matrix12, s: &SVector<f64, 12>, p_AB: &Vector3<f64>) 
         "rotation about y",
         "rotation about z",
     ];
-    // Rigid motions about the midpoint C of AB, so that neither interface is preferred.
-    let half = Pose::translation(0.5 * p_AB.x, 0.5 * p_AB.y, 0.5 * p_AB.z);
+    // Rigid motions about the midpoint C of AB, so that neither interface is preferred:
+    // R = [Ad_AC; Ad_BC] with p_AC = p_AB/2 = -p_BC.
+    let X_AC = Pose::translation(0.5 * p_AB.x, 0.5 * p_AB.y, 0.5 * p_AB.z);
     let mut R = SMatrix::<f64, 12, 6>::zeros();
-    R.fixed_view_mut::<6, 6>(0, 0).copy_from(&adjoint(&half)); // p_AC = p_AB/2
-    R.fixed_view_mut::<6, 6>(6, 0).copy_from(&adjoint(&half.inverse()));
+    R.fixed_view_mut::<6, 6>(0, 0).copy_from(&adjoint(&X_AC));
+    R.fixed_view_mut::<6, 6>(6, 0).copy_from(&adjoint(&X_AC.inverse()));
 
     let force = K * R;
     let size = R.abs().transpose() * s;
@@ -296,9 +310,11 @@ pub(crate) fn lever(p_AB: &Vector3<f64>) -> Matrix6<f64> {
 fn implied_lever(K: &Matrix12) -> Option<Vector3<f64>> {
     let K_BB = K.fixed_view::<6, 6>(6, 6).into_owned();
     let Ad_BA = -K_BB.try_inverse()? * K.fixed_view::<6, 6>(6, 0);
-    let p = Vector3::new(Ad_BA[(1, 5)] - Ad_BA[(2, 4)], Ad_BA[(2, 3)] - Ad_BA[(0, 5)], Ad_BA[(0, 4)] - Ad_BA[(1, 3)])
-        * -0.5;
-    let p_AB = -p;
+    // The coupling block of Ad_BA is [p_BA]x; p_BA is the axial vector of its skew part.
+    let p_BA =
+        Vector3::new(Ad_BA[(1, 5)] - Ad_BA[(2, 4)], Ad_BA[(2, 3)] - Ad_BA[(0, 5)], Ad_BA[(0, 4)] - Ad_BA[(1, 3)])
+            * -0.5;
+    let p_AB = -p_BA;
     let difference = Ad_BA - lever(&p_AB);
     let size = 1.0 + p_AB.norm();
     (difference.amax() <= 1e-3 * size).then_some(p_AB)

@@ -75,7 +75,9 @@ impl Material {
         ("en_gjs_400", "ductile_iron"),
     ];
 
-    /// Material with the isotropic shear modulus `E / (2 (1 + nu))`.
+    /// Material with the isotropic shear modulus `G = E / (2 (1 + nu))`.
+    ///
+    /// * `E`: Pa; `nu`: Poisson's ratio; `rho`: kg/m³; checked by [`Self::check`].
     pub const fn isotropic(E: f64, nu: f64, rho: f64) -> Self {
         Self { E, nu, rho, G: None }
     }

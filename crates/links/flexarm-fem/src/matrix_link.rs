@@ -75,6 +75,9 @@ pub struct MatrixReduction {
 /// * `K`, `M`: SI, with the same rows.
 /// * `boundary`: retained rows, interface by interface, `ux uy uz rx ry rz`.
 /// * `frames`: interfaces of these rows.
+/// * `modes`: fixed-interface modes to keep.
+///
+/// Returns six coordinates per interface, then the modes; axes and points of the retained rows.
 ///
 /// # Errors
 /// [`MeshLinkError::Reduction`], [`MeshLinkError::Modes`].
@@ -96,9 +99,15 @@ pub fn reduce_matrices(
     Ok(condensation.superelement(frames, &modes))
 }
 
-/// Rotates the matrices of a superelement from their own axes to link axes.
+/// Rotates the matrices of a superelement from their own axes M to link axes.
 ///
+/// ```text
+/// K_L = Q K_M Qᵀ,   Q = blkdiag(R_LM, ..., R_LM, 1)
+/// ```
+/// * `element`: matrices in M axes, interfaces in L.
 /// * `R_LM`: rotation from the axes of the matrices to link axes.
+///
+/// Returns the superelement with the same points and interfaces; modes have no axes.
 pub fn turned(element: Superelement, R_LM: &Matrix3<f64>) -> Superelement {
     let n = element.K.nrows();
     let mut Q = DMatrix::identity(n, n);
@@ -109,7 +118,12 @@ pub fn turned(element: Superelement, R_LM: &Matrix3<f64>) -> Superelement {
     Superelement { K: turn(&element.K), M: turn(&element.M), interfaces: element.interfaces }
 }
 
-/// Makes a link of a superelement in link axes; `has_mass`: whether its mass matrix is meaningful.
+/// Makes a link of a superelement.
+///
+/// * `element`: two or more interfaces, proximal first; link axes, SI.
+/// * `has_mass`: whether its mass matrix is meaningful.
+///
+/// Returns the link with frequencies and the mass properties of the whole, link axes.
 ///
 /// # Errors
 /// [`MeshLinkError::Gate`] if the stiffness fails the gate, or if the mass is missing or
@@ -124,9 +138,9 @@ pub fn link_from_superelement(
     let K12 = stiffness12(&element).ok_or(loose)?;
     let frames = LinkFrames::new(element.interfaces[0].X_LI, element.interfaces[1].X_LI);
     let mut caveats = Vec::new();
-    let (p, said) = split_point(&frames, &K12, plan.split, &|_| true);
+    let (p_LS, said) = split_point(&frames, &K12, plan.split, &|_| true);
     caveats.extend(said.map(|said| Finding::warning("split", "", said, "")));
-    let frames = frames.with_split(Pose::translation(p.x, p.y, p.z));
+    let frames = frames.with_split(Pose::translation(p_LS.x, p_LS.y, p_LS.z));
 
     // The whole body, then its two parts.
     let whole = match &plan.masses {
@@ -152,7 +166,8 @@ pub fn link_from_superelement(
             halves_of_bar(&whole, &frames.p_AB())
         }
     };
-    // The link, which passes the gate here; then frequencies and masses are compared with the matrices.
+    // The link, which passes the gate here; then frequencies and masses are compared with the
+    // matrices.
     let mut link = ReducedLink::from_matrix12(&plan.name, frames, &K12, parts, plan.provenance.clone(), &plan.limits)?;
     let held_frequencies_hz = if has_mass { element.frequencies_hz(&[0]) } else { Vec::new() };
     if has_mass && held_frequencies_hz.is_empty() {
@@ -182,6 +197,10 @@ pub fn link_from_superelement(
 /// second moment of the bar along its axis over its mass. A bowed body may have no such halves.
 /// Then the halves of its ellipsoid of inertia, cut across the axis, are used: their centres are
 /// along `S a` (S: second moments, a: axis), and they always exist.
+///
+/// * `whole`: any frame; `along`: axis from the first half to the second, same axes, any length.
+///
+/// Returns both halves in the frame of `whole`, each with half its mass.
 pub fn halves_of_bar(whole: &RigidPart, along: &Vector3<f64>) -> [RigidPart; 2] {
     let axis = along.normalize();
     // Second moment along the axis: half the trace minus the moment about the axis.

@@ -27,7 +27,8 @@ pub struct ModeCheck {
 }
 
 impl ModeCheck {
-    /// Relative frequency error of the reduced model.
+    /// Relative frequency error `f_reduced/f_mesh - 1` of the reduced model; `None` without such a
+    /// mode.
     pub fn reduced_error(&self) -> Option<f64> {
         self.reduced_hz.map(|hz| hz / self.mesh_hz - 1.0)
     }
@@ -68,7 +69,9 @@ fn one() -> f64 {
 }
 
 impl ElementQuality {
-    /// Measures every solid element of a mesh.
+    /// Measures every solid element of a mesh; beams only count.
+    ///
+    /// Returns extremes with the numbers of their elements; 1 for a mesh without solids.
     pub fn of(mesh: &Mesh) -> Self {
         let mut quality =
             Self { smallest_at_points: 1.0, smallest_at_nodes: 1.0, smallest_fullness: 1.0, ..Self::default() };
@@ -190,17 +193,18 @@ impl MeshGate {
     /// Residual of a mode above which [`Self::findings`] warns. The relative error of the squared
     /// frequency is below the residual; in thin plates rounding alone gives 1e-6.
     pub const MODE_RESIDUAL: f64 = 1e-5;
-    /// Jacobian at a node, relative to the mean of its element, below which [`Self::findings`] warns.
+    /// Jacobian at a node, relative to the mean of its element, below which [`Self::findings`]
+    /// warns.
     pub const SMALLEST_JACOBIAN: f64 = 0.05;
     /// Volume of an element, relative to the ideal shape, below which the element counts as flat.
     pub(crate) const SMALLEST_FULLNESS: f64 = 0.01;
     /// Fraction of flat elements above which [`Self::findings`] warns.
     pub(crate) const FEW_FLAT: f64 = 1e-3;
-    /// Offset of a mid-side node, relative to its edge length, above which [`Self::findings`] warns:
-    /// an arc of 140 degrees.
+    /// Offset of a mid-side node, relative to its edge length, above which [`Self::findings`]
+    /// warns: an arc of 140 degrees.
     pub(crate) const LARGEST_OFFSET: f64 = 0.35;
 
-    /// Returns warnings about results that pass but are suspicious.
+    /// Returns one warning per measure beyond its limit: results that pass but are suspicious.
     pub fn findings(&self) -> Vec<Finding> {
         let mut findings = Vec::new();
         let mut see = |code: &'static str, value: f64, usual: f64, bad: bool, sentence: String| {

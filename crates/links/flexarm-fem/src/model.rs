@@ -163,7 +163,14 @@ pub fn materials(mesh: &Mesh, options: &AssemblyOptions) -> Result<Vec<Material>
 }
 
 impl FeModel {
-    /// Assembles stiffness and mass of `mesh`.
+    /// Assembles stiffness and mass of a mesh.
+    ///
+    /// ```text
+    /// K = Σ_e K_e,   M = Σ_e M_e (consistent)
+    /// ```
+    /// * `mesh`: SI; its axes are those of the DoF.
+    ///
+    /// Returns the unsupported model: K has the six rigid motions as null space.
     ///
     /// # Errors
     /// [`AssemblyError`].
@@ -173,6 +180,7 @@ impl FeModel {
         if dofs.size() == 0 {
             return Err(AssemblyError::Empty);
         }
+        // The pattern is known before the values, so element matrices are added in place.
         let graph = NodeGraph::new(mesh, &dofs);
         let mut K = SparseSymmetric::zeros(graph.dof_pattern(&dofs));
         let mut M = MassMatrix::zeros(&graph, &dofs);
@@ -190,7 +198,8 @@ impl FeModel {
                     *x = mesh.nodes[*node as usize];
                 }
                 let material = &materials[block.region];
-                // K_e into the rows of its DoF, M_e, which is the same along x, y and z, into those of its nodes.
+                // K_e goes to the rows of its DoF; M_e, the same along x, y and z, to those of its
+                // nodes.
                 match workspace.stiffness_and_mass(block.kind, &x, material, options.quadrature) {
                     Ok(()) => {
                         graph.add_blocks(&dofs, nodes, 3, workspace.stiffness(), &mut K.values);
@@ -206,12 +215,17 @@ impl FeModel {
     }
 
     /// Model with matrices from another source; it has rows, but no node positions.
+    ///
+    /// * `K`, `M`: stiffness and mass over the same DoF, SI. [`Self::rigid_modes`] has no meaning
+    ///   for such a model.
     pub fn from_matrices(K: SparseSymmetric, M: SparseSymmetric) -> Self {
         let dofs = DofMap { first: (0..=K.size() as u32).collect() };
         Self { nodes: vec![Vector3::zeros(); K.size()], dofs, K, M: MassMatrix::from_general(M) }
     }
 
     /// Model of solids with matrices from another source: three DoF per node, node by node.
+    ///
+    /// * `nodes`: positions, m; `K`, `M`: SI, axes of the nodes.
     ///
     /// # Panics
     /// If the matrices do not have three rows per node.
@@ -226,7 +240,14 @@ impl FeModel {
         self.dofs.size()
     }
 
-    /// The six rigid motions about `point`, as columns: three translations, three rotations.
+    /// The six rigid motions of the nodes about a point.
+    ///
+    /// ```text
+    /// u_node = v + w × (p_node - point),   θ_node = w      columns: v, then w
+    /// ```
+    /// * `point`: mesh axes, m.
+    ///
+    /// Returns one row per DoF (m, rad) and six columns.
     pub fn rigid_modes(&self, point: &Vector3<f64>) -> DMatrix<f64> {
         let mut R = DMatrix::zeros(self.size(), 6);
         for (node, p) in self.nodes.iter().enumerate() {
@@ -274,7 +295,8 @@ impl Inverted {
     }
 }
 
-/// Beam element between its nodes, and the rotation from its axes to mesh axes: `A = Q A_E Qᵀ`.
+/// Beam element between its nodes, and `Q = blkdiag(R_ME, ...)`, 12×12, from its axes E to mesh
+/// axes M: `K_M = Q K_E Qᵀ`.
 pub(crate) fn beam_of(
     mesh: &Mesh,
     region: usize,
@@ -296,13 +318,15 @@ pub(crate) fn beam_of(
     Ok((beam, Q))
 }
 
-/// Stiffness of one beam element in mesh axes.
+/// Stiffness of one beam element, 12×12, both nodes, mesh axes; `None` for an invalid beam.
 pub(crate) fn beam_stiffness(mesh: &Mesh, region: usize, nodes: &[u32], material: &Material) -> Option<DMatrix<f64>> {
     let (beam, Q) = beam_of(mesh, region, nodes, material).ok()?;
     let K = Q * beam.stiffness12() * Q.transpose();
     Some(DMatrix::from_column_slice(12, 12, K.as_slice()))
 }
 
+/// Adds the beams of a block: stiffness to K, mass as triplets (row, column, value) of its lower
+/// triangle.
 fn add_beams(
     mesh: &Mesh,
     block: &ElementBlock,
@@ -331,7 +355,10 @@ fn add_beams(
     Ok(())
 }
 
-/// Axes of a beam in mesh axes, as columns: x along it, y as close to `y_axis` as possible.
+/// Rotation `R_ME` of the beam axes E in mesh axes M: x along the beam, y as close to `y_axis` as
+/// possible.
+///
+/// * `along`, `y_axis`: mesh axes, any length.
 pub(crate) fn beam_axes(along: &Vector3<f64>, y_axis: &Vector3<f64>) -> Result<nalgebra::Matrix3<f64>, FemError> {
     let x = along.normalize();
     let y = y_axis - x * x.dot(y_axis);

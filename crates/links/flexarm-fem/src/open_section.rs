@@ -40,6 +40,9 @@ struct Piece {
 }
 
 impl Open {
+    /// Properties of an I-beam, web along z; see [`Section::IBeam`](crate::Section).
+    ///
+    /// * `nu`: Poisson's ratio, for the shear factors.
     pub(crate) fn i_beam(&self, nu: f64) -> Result<SectionProperties, FemError> {
         self.check(0.5 * (self.width - self.web))?;
         let Self { width: b, height: h, web, flange, .. } = *self;
@@ -54,6 +57,10 @@ impl Open {
         Ok(SectionProperties { A, I_y, I_z, J: self.torsion(Junction::Tee), k_y, k_z, shear_centre_y: 0.0 })
     }
 
+    /// Properties of a channel, web along z, flanges to +y; see
+    /// [`Section::Channel`](crate::Section).
+    ///
+    /// * `nu`: Poisson's ratio, for the shear factors.
     pub(crate) fn channel(&self, nu: f64) -> Result<SectionProperties, FemError> {
         self.check(self.width - self.web)?;
         let Self { width: b, height: h, web, flange, .. } = *self;
@@ -140,7 +147,8 @@ impl Open {
     /// flanges.
     ///
     /// ```text
-    /// J = 2/3 b t_f³ + 1/3 (h - 2 t_f) t_w³ + 2 α D⁴ - 0.420 t_f⁴       D: largest circle inscribed in a junction
+    /// J = 2/3 b t_f³ + 1/3 (h - 2 t_f) t_w³ + 2 α D⁴ - 0.420 t_f⁴
+    /// D: diameter of the largest circle inscribed in a junction
     /// ```
     ///
     /// # Source

@@ -50,7 +50,7 @@ impl OrderCheck {
     /// Ratio above which the mesh is reported as too stiff, and below its inverse as too soft.
     pub const LARGEST_RATIO: f64 = 1.1;
 
-    /// Ratio with the largest deviation from one.
+    /// Compliance ratio, second order to mesh, with the largest `|ln ratio|`; 1 if both agree.
     pub fn worst(&self) -> f64 {
         let off = |ratio: &f64| if *ratio > 0.0 { ratio.ln().abs() } else { f64::INFINITY };
         self.compliance_ratio.into_iter().max_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(1.0)
@@ -137,6 +137,9 @@ struct Edge {
 }
 
 impl<'m> Hierarchy<'m> {
+    /// Finds the new nodes and inverts their diagonal blocks.
+    ///
+    /// * `model`: of second order; `ends`: nodes of each edge, in the order of the new nodes.
     fn new(mesh: &Mesh, interfaces: &[Interface], model: &'m FeModel, ends: Vec<[u32; 2]>) -> Self {
         let tied = tied_edges(mesh, interfaces);
         let first = |node: u32| model.dofs.of(node as usize).start;

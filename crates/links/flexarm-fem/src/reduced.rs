@@ -140,6 +140,7 @@ impl ReducedLink {
         Self::assemble(name.into(), frames, K_BB, checks, parts, provenance)
     }
 
+    /// Checks the parts and places the elastic joint.
     fn assemble(
         name: String,
         frames: LinkFrames,
@@ -166,17 +167,20 @@ impl ReducedLink {
         self.proximal.mass + self.distal.mass
     }
 
-    /// Both parts merged into one rigid body, for the rigid reference model.
+    /// Both parts merged into one rigid body, link axes, for the rigid reference model.
     pub fn rigid(&self) -> RigidPart {
         self.proximal.merged(&self.distal)
     }
 
-    /// Vector from A to B, link axes, m.
+    /// Vector `p_AoBo_L` from A to B, link axes, m.
     pub fn p_AB(&self) -> Vector3<f64> {
         self.frames().p_AB()
     }
 
-    /// Compliance `C_BB = K_BB⁻¹` at Bo with A clamped, link axes.
+    /// Compliance of the distal interface with A clamped, `u_B = C_BB F_B`.
+    ///
+    /// Returns `C_BB = K_BB⁻¹`, 6×6 (m/N, m/(N·m); rad/N, rad/(N·m)), at Bo, link axes, exactly
+    /// symmetric.
     ///
     /// # Errors
     /// [`FemError::NotPositiveDefinite`] if the caller has changed `K_BB` into a singular matrix.
@@ -195,7 +199,14 @@ impl ReducedLink {
         })
     }
 
-    /// Stiffness of both interfaces, 12×12, A then B, link axes, for export to FE programs.
+    /// Stiffness of both interfaces, for export to FE programs.
+    ///
+    /// ```text
+    /// K = [ Adᵀ K_BB Ad   -Adᵀ K_BB ]      F = K [u_A; u_B],   Ad = Ad_BA
+    ///     [  -K_BB Ad        K_BB   ]
+    /// ```
+    /// Returns K, 12×12 (N/m, N/rad; N·m/m, N·m/rad), at Ao and Bo, link axes, exactly symmetric.
+    /// Its null space is the six rigid motions.
     pub fn matrix12(&self) -> Matrix12 {
         let Ad_BA = lever(&self.p_AB());
         let K_AB = -Ad_BA.transpose() * self.K_BB;
@@ -233,8 +244,11 @@ impl ReducedLink {
 
     /// Moves the elastic joint to another frame. The cut between the parts is unchanged.
     ///
+    /// * `X_LS`: pose of the new split frame in the link frame, m.
+    ///
     /// # Errors
-    /// Errors of [`stiffness_at_split`].
+    /// Errors of [`stiffness_at_split`]; [`FemError::OutOfRange`] for a frame more than 100 m from
+    /// the link origin.
     pub fn with_split(&self, X_LS: Pose) -> Result<Self, FemError> {
         let frames = self.frames().with_split(X_LS);
         frames.check()?;
@@ -244,7 +258,8 @@ impl ReducedLink {
 
     /// Reduces `K_S` to its diagonal, as a plain spring model does.
     ///
-    /// Only to show the resulting error; `K_BB` is updated so that the link stays consistent.
+    /// Only to show the resulting error; `K_BB = Ad_SBᵀ diag(K_S) Ad_SB`, so that the link stays
+    /// consistent. The parts are unchanged.
     pub fn without_coupling(&self) -> Self {
         let K_S = drop_coupling(&self.split.K_S);
         let Ad_SB = adjoint(&self.frames().X_BS().inverse());
@@ -254,6 +269,7 @@ impl ReducedLink {
     }
 }
 
+/// Elastic joint at S of the stiffness at Bo, link axes.
 fn elastic_split(frames: &LinkFrames, K_BB: &Matrix6<f64>) -> Result<ElasticSplit, FemError> {
     let K_S = stiffness_at_split(K_BB, &frames.X_BS())?;
     Ok(ElasticSplit { X_LS: frames.X_LS, K_S })
@@ -288,6 +304,10 @@ pub fn stiffness_at_split(K_BB: &Matrix6<f64>, X_BS: &Pose) -> Result<Matrix6<f6
 /// Diagonal of `K_S`: six separate springs, as in plain spring models.
 ///
 /// Wrong by tens of per cent where `K_S` is coupled; only for demonstrating that error.
+///
+/// * `K_S`: 6×6 (N/m, N/rad; N·m/m, N·m/rad), at So, in S axes.
+///
+/// Returns a diagonal 6×6 matrix at the same point, in the same axes.
 pub fn drop_coupling(K_S: &Matrix6<f64>) -> Matrix6<f64> {
     Matrix6::from_diagonal(&K_S.diagonal())
 }

@@ -2,7 +2,7 @@
 //!
 //! Link axes; the inertia is about the centre of mass, kg·m². Start at [`RigidPart`].
 //!
-//! Not here: the cut of a mesh ([`crate::cut`]), spatial inertias of recursions
+//! Not here: the cut of a mesh ([`cut`](crate::cut())), spatial inertias of recursions
 //! ([`flexarm_spatial::SpatialInertia`]).
 
 use flexarm_spatial::{Pose, skew, symmetric_part};
@@ -27,12 +27,19 @@ pub struct RigidPart {
 
 impl RigidPart {
     /// Transforms the part from frame E to frame L.
+    ///
+    /// ```text
+    /// p_LoPcm_L = X_LE p_EoPcm_E,   I_L = R_LE I_E R_LEᵀ
+    /// ```
+    /// * `X_LE`: pose of E in L, m; the part is given in E.
+    ///
+    /// Returns the part in L, its inertia exactly symmetric.
     pub fn transformed(&self, X_LE: &Pose) -> Self {
-        let R = X_LE.rotation.matrix();
+        let R_LE = X_LE.rotation.matrix();
         Self {
             mass: self.mass,
             com: X_LE.rotation * self.com + X_LE.translation.vector,
-            inertia: R * self.inertia * R.transpose(),
+            inertia: R_LE * self.inertia * R_LE.transpose(),
         }
         .symmetrised()
     }
@@ -43,6 +50,13 @@ impl RigidPart {
     }
 
     /// Merges this part and another one into a single rigid body.
+    ///
+    /// ```text
+    /// m = Σ m_i,   c = Σ m_i c_i / m,   I = Σ (I_i - m_i [c_i - c]x²)
+    /// ```
+    /// * `other`: in the same frame as this part.
+    ///
+    /// Returns the body in that frame; not finite if the total mass is zero.
     pub fn merged(&self, other: &Self) -> Self {
         let mass = self.mass + other.mass;
         let com = (self.com * self.mass + other.com * other.mass) / mass;
@@ -53,22 +67,29 @@ impl RigidPart {
         Self { mass, com, inertia: about_com(self) + about_com(other) }
     }
 
-    /// Removes another part that this one contains.
+    /// Removes another part that this one contains: the inverse of [`Self::merged`].
+    ///
+    /// * `other`: in the same frame as this part. The result is not checked; [`Self::check`]
+    ///   rejects an impossible one.
     pub fn less(&self, other: &Self) -> Self {
         self.merged(&Self { mass: -other.mass, com: other.com, inertia: -other.inertia })
     }
 
-    /// Scales the part to the mass `mass` with its shape unchanged.
+    /// Scales the part to another mass; its centre of mass and its radii of gyration stay.
+    ///
+    /// * `mass`: new mass, kg.
     pub fn with_mass(&self, mass: f64) -> Self {
         let inertia = self.inertia * (mass / self.mass);
         Self { mass, com: self.com, inertia }
     }
 
-    /// Spatial inertia about the link origin, link axes.
+    /// Spatial inertia about the link origin, linear part first.
     ///
     /// ```text
-    /// M = [[m 1, -m[c]x], [m[c]x, I - m[c]x²]]
+    /// M = [  m 1       -m [c]x    ]      c = p_LoPcm_L
+    ///     [ m [c]x   I - m [c]x²  ]
     /// ```
+    /// Returns M, 6×6 (kg, kg·m; kg·m, kg·m²), about Lo, link axes.
     pub fn spatial_inertia(&self) -> Matrix6<f64> {
         let mc = skew(&self.com) * self.mass;
         let mut M = Matrix6::zeros();
@@ -99,6 +120,7 @@ impl RigidPart {
         self.check_inertia(part)
     }
 
+    /// Checks symmetry, sign and triangle inequality of the principal moments.
     fn check_inertia(&self, part: &str) -> Result<(), FemError> {
         let refuse = |principal: [f64; 3], rule| {
             let part = part.to_owned();
@@ -121,6 +143,7 @@ impl RigidPart {
         };
         let mut principal = [eigen.eigenvalues[0], eigen.eigenvalues[1], eigen.eigenvalues[2]];
         principal.sort_by(f64::total_cmp);
+        // Each principal moment is a sum of two second moments, none of which is negative.
         let [low, middle, high] = principal;
         let principal = principal.map(|x| x * size);
         if low <= 0.0 {

@@ -8,8 +8,8 @@
 //!
 //! Start at [`Section::bar`]; [`Section::properties`] is the purely geometric step.
 //!
-//! Not here: I-beams and channels (`open_section`), stress on the outline (`section_outline`), the element
-//! ([`crate::beam`]).
+//! Not here: I-beams and channels (`open_section`), stress on the outline (`section_outline`), the
+//! element ([`crate::beam`]).
 
 use std::f64::consts::PI;
 
@@ -215,7 +215,12 @@ impl Section {
         }
     }
 
-    /// Stiffness and mass of the section with a material.
+    /// Stiffness and mass of the section with a material, along its axes y and z.
+    ///
+    /// ```text
+    /// EA, EI_y, EI_z, GJ, k_y GA, k_z GA,   μ = rho A,   rotary = rho I
+    /// ```
+    /// * `material`: not used by [`Section::Given`].
     ///
     /// # Errors
     /// As [`Section::properties`], and [`FemError::OutOfRange`] for an impossible material or bar.
@@ -269,6 +274,7 @@ impl Bar {
     }
 }
 
+/// Properties of a solid rectangle, width along y; shear factor of [Cowper 1966].
 fn rectangle(width: f64, height: f64, nu: f64) -> Result<SectionProperties, FemError> {
     positive("width (m)", width)?;
     positive("height (m)", height)?;
@@ -300,6 +306,7 @@ fn rectangle_torsion(width: f64, height: f64) -> f64 {
     a * b.powi(3) * (1.0 / 3.0 - 64.0 / PI.powi(5) * (b / a) * sum)
 }
 
+/// Properties of a box with walls of equal thickness, width along y.
 fn hollow_box(width: f64, height: f64, wall: f64, nu: f64) -> Result<SectionProperties, FemError> {
     positive("width (m)", width)?;
     positive("height (m)", height)?;
@@ -341,6 +348,7 @@ fn box_shear_factor(a: f64, b: f64, nu: f64) -> f64 {
             + 10.0 * m2 * ((3.0 + nu) * m + 3.0 * m2))
 }
 
+/// Properties of a circle or tube with the given diameters, m.
 fn ring(outer: f64, inner: f64, nu: f64) -> Result<SectionProperties, FemError> {
     positive("diameter (m)", outer)?;
     let (ro, ri) = (0.5 * outer, 0.5 * inner);
@@ -360,6 +368,7 @@ fn ring(outer: f64, inner: f64, nu: f64) -> Result<SectionProperties, FemError> 
     })
 }
 
+/// Checks that a wall (m) leaves a hole in the smallest outer size (m).
 fn check_wall(wall: f64, smallest: f64) -> Result<(), FemError> {
     if wall > 0.0 && wall < 0.5 * smallest {
         return Ok(());

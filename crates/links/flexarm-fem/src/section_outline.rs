@@ -4,12 +4,12 @@
 //!
 //! ```text
 //! σ = N/A + M_y z/I_y - M_z y/I_z
-//! τ = T torsion + V_y shear_y + V_z shear_z        along the outline, counter-clockwise seen against x
+//! τ = T torsion + V_y shear_y + V_z shear_z
 //! ```
-//! Torsion is that of St. Venant: exact for circles and at the middles of the sides of rectangles,
-//! Bredt's for boxes, that of strips for I-beams and channels. Shear by forces is the shear flow of
-//! thin walls, and the formula of Jouravski for solid shapes. Warping of open sections is not
-//! included.
+//! τ is positive along the outline, counter-clockwise seen against x. Torsion is that of St.
+//! Venant: exact for circles and at the middles of the sides of rectangles, Bredt's for boxes, that
+//! of strips for I-beams and channels. Shear by forces is the shear flow of thin walls, and the
+//! formula of Jouravski for solid shapes. Warping of open sections is not included.
 //!
 //! Source: Timoshenko & Goodier, *Theory of Elasticity*, art. 109 and 113 to 115.
 
@@ -51,8 +51,8 @@ impl OutlinePoint {
 }
 
 impl Section {
-    /// Returns the points of the outline, counter-clockwise. Two of them at one place are the ends of
-    /// two walls.
+    /// Returns the points of the outline, counter-clockwise. Two of them at one place are the ends
+    /// of two walls.
     ///
     /// # Errors
     /// As [`Section::properties`].

@@ -10,7 +10,7 @@ use crate::mesh::BeamProperties;
 use crate::rigid_part::RigidPart;
 use crate::section::Section;
 
-/// `∫ dm`, `∫ r dm`, `∫ r rᵀ dm` with `r` measured from `origin`.
+/// `∫ dm` (kg), `∫ r dm` (kg·m), `∫ r rᵀ dm` (kg·m²) with `r` measured from `origin`, mesh axes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Moments {
     pub(super) origin: Vector3<f64>,
@@ -63,6 +63,9 @@ pub(super) struct Line {
 }
 
 impl Line {
+    /// Creates the line of a beam element between two nodes, mesh axes, m.
+    ///
+    /// * `density`: kg/m³, unless the section has its own mass.
     pub(super) fn new(
         beam: &BeamProperties,
         density: f64,
@@ -90,7 +93,7 @@ impl Line {
         Ok(Self { start, along, mass: mass_per_length * length, section })
     }
 
-    /// Moments of the piece between two fractions of the length.
+    /// Moments of the piece between two fractions of the length, about `origin` (mesh axes, m).
     pub(super) fn piece(&self, from: f64, to: f64, origin: &Vector3<f64>) -> Moments {
         let share = to - from;
         let mut moments = Moments::about(*origin);

@@ -31,8 +31,8 @@ pub(super) enum Side {
     Crossed,
 }
 
-/// Position of an element; some curved elements near the plane are reported as crossed although
-/// they are not.
+/// Position of an element with the nodes x (mesh axes, m); some curved elements near the plane are
+/// reported as crossed although they are not.
 pub(super) fn side(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane) -> Side {
     let corners = corners(kind);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -66,14 +66,15 @@ fn corners(kind: ElementKind) -> usize {
     }
 }
 
-/// Fractions of the length of a crossed beam between which it is ahead of the plane.
+/// Fractions of the length of a crossed beam, from its first node, between which it is ahead of the
+/// plane.
 pub(super) fn ahead_of_line(x: &[Vector3<f64>], plane: &Plane) -> (f64, f64) {
     let (d_0, d_1) = (plane.distance(&x[0]), plane.distance(&x[1]));
     let root = d_0 / (d_0 - d_1);
     if d_0 > 0.0 { (0.0, root) } else { (root, 1.0) }
 }
 
-/// Exact moments of the volume of an element.
+/// Exact moments of the volume of an element (m³, m⁴, m⁵) about `origin`; x, origin: mesh axes, m.
 pub(super) fn whole(kind: ElementKind, x: &[Vector3<f64>], origin: &Vector3<f64>) -> Result<Moments, InvertedElement> {
     let mut moments = Moments::about(*origin);
     for_each_point(kind, x, Purpose::Mass, Quadrature::Exact, |point| {
@@ -82,7 +83,7 @@ pub(super) fn whole(kind: ElementKind, x: &[Vector3<f64>], origin: &Vector3<f64>
     Ok(moments)
 }
 
-/// Moments of the volume of an element ahead of the plane.
+/// As [`whole`], of the volume ahead of the plane; see the module for its error.
 pub(super) fn ahead(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane, origin: &Vector3<f64>) -> Moments {
     let n = kind.nodes();
     let mut d = [0.0; 20];
@@ -98,6 +99,7 @@ pub(super) fn ahead(kind: ElementKind, x: &[Vector3<f64>], plane: &Plane, origin
     clip.moments
 }
 
+/// Reference coordinates of an element, dimensionless.
 type Xi = Vector3<f64>;
 
 /// Splits the reference element into tetrahedra of positive volume.
@@ -113,11 +115,14 @@ fn reference_tets(kind: ElementKind) -> Vec<[Xi; 4]> {
 
 const EDGES: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 0], [0, 3], [1, 3], [2, 3]];
 
+/// Integration of one element over what is ahead of the plane.
 struct Clip<'a> {
     kind: ElementKind,
+    /// Positions of the nodes, mesh axes, m.
     x: &'a [Vector3<f64>],
     /// Distances of the nodes from the plane.
     d: [f64; 20],
+    /// Accepted deviation of `d` from linear, m.
     flat: f64,
     origin: &'a Vector3<f64>,
     moments: Moments,
@@ -160,6 +165,8 @@ impl Clip<'_> {
     fn clip(&mut self, tet: &[Xi; 4], d: [f64; 4], depth: usize) {
         let mut order = [0, 1, 2, 3];
         order.sort_by(|a, b| d[*b].total_cmp(&d[*a]));
+        // Vertices by falling distance: the first `ahead` of them are ahead of the plane, and the
+        // cut is at the roots of d on the edges to the others.
         let ahead = d.iter().filter(|d| **d > 0.0).count();
         let v = order.map(|i| tet[i]);
         let root = |a: usize, b: usize| {
@@ -201,13 +208,14 @@ impl Clip<'_> {
         }
     }
 
+    /// Interpolated distance `d(xi)` from the plane, m.
     fn distance(&self, xi: &Xi) -> f64 {
         let (mut N, mut dN) = ([0.0; 20], [[0.0; 3]; 20]);
         shape_functions(self.kind, (*xi).into(), &mut N, &mut dN);
         N.iter().zip(&self.d).map(|(N, d)| N * d).sum()
     }
 
-    /// Position relative to the origin, and `det J`.
+    /// Position relative to the origin (m, mesh axes), and `det J` (m³).
     fn place(&self, xi: &Xi) -> (Vector3<f64>, f64) {
         let (mut N, mut dN) = ([0.0; 20], [[0.0; 3]; 20]);
         shape_functions(self.kind, (*xi).into(), &mut N, &mut dN);

@@ -121,6 +121,10 @@ pub(crate) struct Nodes {
 }
 
 impl Nodes {
+    /// Classifies an element by the positions of its nodes, m, any axes.
+    ///
+    /// # Panics
+    /// For a beam, and for a wrong number of nodes.
     pub(crate) fn new(kind: ElementKind, x: &[Vector3<f64>]) -> Self {
         let n = kind.nodes();
         assert!(!kind.is_beam() && x.len() == n, "a {} has {n} nodes, {} were given", kind.name(), x.len());

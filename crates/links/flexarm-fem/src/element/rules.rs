@@ -116,6 +116,7 @@ pub(crate) struct Table {
 }
 
 impl Table {
+    /// Evaluates the shape functions and their derivatives at the points of a rule.
     pub(crate) fn new(kind: ElementKind, points: &[WeightedPoint]) -> Self {
         let n = kind.nodes();
         let mut table = Self { n, xi: vec![], weight: vec![], N: vec![], dN: vec![], NN: vec![] };

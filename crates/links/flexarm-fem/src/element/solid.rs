@@ -196,6 +196,7 @@ fn gradient_products<const N: usize, const D: usize>(
     Ok(largest_det)
 }
 
+/// Jacobian at the centre of a brick, where the gradients of its n = 8 shape functions are `ξ_i/8`.
 fn centre_of_brick(kind: ElementKind, n: usize, nodes: &Nodes) -> Result<Jacobian, InvertedElement> {
     let mut dN = [0.0; 3 * 8];
     for (i, node) in super::shape::reference_nodes(kind).iter().enumerate() {

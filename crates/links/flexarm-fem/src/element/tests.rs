@@ -274,7 +274,8 @@ fn the_stiffness_of_a_curved_tetrahedron_does_not_depend_on_the_rule() {
     }
 }
 
-/// Hooke's law `sigma = D epsilon` in the order `xx yy zz xy yz zx`, with engineering shear strains.
+/// Hooke's law `sigma = D epsilon` in the order `xx yy zz xy yz zx`, with engineering shear
+/// strains.
 fn stress_strain(material: &Material) -> Matrix6<f64> {
     let (lambda, mu) = lame(material);
     Matrix6::from_fn(|i, j| match (i < 3 && j < 3, i == j) {

@@ -130,6 +130,10 @@ pub(super) fn read_details(
     Ok(())
 }
 
+/// Reads `[superelement]` and checks sizes, symmetry and agreement with the link.
+///
+/// # Errors
+/// [`FlexFileError`] at the entry that is wrong.
 fn read_superelement(
     node: &Node<'_, '_>,
     units: &Units,
@@ -220,6 +224,7 @@ fn read_dense(table: &Table<'_, '_>, key: &str, smallest: usize) -> Result<DMatr
     Ok(A)
 }
 
+/// Reads one `[[chain]]`: joints, then parts, and checks that they add up to the link.
 fn read_chain(node: &Node<'_, '_>, units: &Units, link: &ReducedLink) -> Result<Chain, FlexFileError> {
     let table = node.table()?;
     table.only(&["joint", "part"])?;

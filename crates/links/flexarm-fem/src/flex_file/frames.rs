@@ -12,6 +12,8 @@ use super::text::numbers;
 use super::units::Units;
 use crate::frames::LinkFrames;
 
+/// Writes a pose: `xyz` in m, and `rpy` in rad if that gives the rotation bit for bit, else the
+/// matrix.
 pub(super) fn pose_lines(X: &Pose) -> String {
     let mut text = format!("xyz = {}\n", numbers(X.translation.vector.iter()));
     let R = X.rotation.matrix();
@@ -24,6 +26,7 @@ pub(super) fn pose_lines(X: &Pose) -> String {
     text
 }
 
+/// Writes a 3×3 as nested rows.
 fn rows(R: &Matrix3<f64>) -> String {
     let rows: Vec<_> = R.row_iter().map(|row| numbers(row.iter())).collect();
     format!("[{}]", rows.join(", "))
@@ -66,6 +69,7 @@ pub(super) fn read_pose(table: &Table<'_, '_>, units: &Units, others: &[&str]) -
     Ok(Pose::from_parts(Translation3::from(p), rotation))
 }
 
+/// Reads a rotation matrix by rows; rejects one that is not orthonormal to 1e-9.
 fn read_rotation(node: &Node<'_, '_>) -> Result<Rotation3<f64>, FlexFileError> {
     let mut R = Matrix3::zeros();
     for (i, row) in node.items(3, "rows")?.iter().enumerate() {

@@ -35,6 +35,7 @@ const KEYS: [&str; 13] = [
 
 /// Writes the table as text.
 pub(super) fn write_modal(modal: &ModalLink) -> String {
+    // Coordinates and interfaces; shapes only if they are not unit columns.
     let n = modal.coordinates();
     let mut text = String::from(
         "\n[modal]                       # shapes with A held: six per interface, then modes; link axes\n",
@@ -66,6 +67,7 @@ pub(super) fn write_modal(modal: &ModalLink) -> String {
         let pairs = (0..n).flat_map(|k| (k..n).map(move |l| k * n + l));
         text += &list("N", pairs.map(|at| nine(&modal.N[at])));
     }
+    // Symmetric matrices over the coordinates.
     text += &format!("K = {}\nM = {}\n", triangle(&modal.K), triangle(&modal.M));
     // Geometric stiffness per unit acceleration, angular acceleration, product of speeds, load.
     if let Some(G) = &modal.geometric {
@@ -155,6 +157,7 @@ fn read_labels(table: &Table<'_, '_>) -> Result<Vec<String>, FlexFileError> {
     list.iter().map(|label| label.text().map(str::to_owned)).collect()
 }
 
+/// Reads the interfaces; without `shapes`, each has six unit columns in their order.
 fn read_interfaces(table: &Table<'_, '_>, units: &Units, n: usize) -> Result<Vec<ModalInterface>, FlexFileError> {
     let node = table.require("interfaces", "the interfaces but A, distal first")?;
     let list = node.list()?;
@@ -197,6 +200,7 @@ fn read_nines(node: &Node<'_, '_>, count: usize) -> Result<Vec<Matrix3<f64>>, Fl
     rows.iter().map(|row| row.numbers::<9>("numbers: a 3x3 by rows").map(|A| Matrix3::from_row_slice(&A))).collect()
 }
 
+/// Reads `N_kl` of the pairs `k <= l`; the others are `N_lk = N_klᵀ`.
 fn read_pairs(node: &Node<'_, '_>, n: usize) -> Result<Vec<Matrix3<f64>>, FlexFileError> {
     let pairs = read_nines(node, n * (n + 1) / 2)?;
     let mut N = vec![Matrix3::zeros(); n * n];
@@ -208,6 +212,7 @@ fn read_pairs(node: &Node<'_, '_>, n: usize) -> Result<Vec<Matrix3<f64>>, FlexFi
     Ok(N)
 }
 
+/// Reads the lower triangle of a symmetric n×n matrix.
 fn read_triangle(node: &Node<'_, '_>, n: usize) -> Result<DMatrix<f64>, FlexFileError> {
     let entries = node.items(n * (n + 1) / 2, "numbers: the lower triangle by rows")?;
     let mut A = DMatrix::zeros(n, n);
@@ -218,6 +223,7 @@ fn read_triangle(node: &Node<'_, '_>, n: usize) -> Result<DMatrix<f64>, FlexFile
     Ok(A)
 }
 
+/// Reads `[modal.geometric]`: one n×n matrix per unit load.
 fn read_geometric(node: &Node<'_, '_>, n: usize, interfaces: usize) -> Result<GeometricStiffness, FlexFileError> {
     let table = node.table()?;
     table.only(&["acceleration", "angular", "centrifugal", "interface"])?;
@@ -248,6 +254,7 @@ fn check_agreement(
         let expected = "the stiffness and the frames of the link";
         Err(node.fail(FlexErrorKind::Link, found, expected, "was one of them edited?"))
     };
+    // The first interface is B.
     let p_LB: &Vector3<f64> = &link.X_LB.translation.vector;
     let gap = (modal.interfaces[0].X_LI.translation.vector - p_LB).norm();
     if !(gap <= 1e-9) {
@@ -258,6 +265,7 @@ fn check_agreement(
             return fail(format!("{found} on the diagonal of {what}"));
         }
     }
+    // Truncated eigenmodes have a smaller compliance than the link.
     if !modal.is_craig_bampton() {
         return Ok(());
     }

@@ -29,6 +29,8 @@ const LARGEST: u64 = 256 << 20;
 
 /// Reads a reduced-link file.
 ///
+/// Returns the checked link: SI, `K_BB` at Bo in link axes.
+///
 /// # Errors
 /// [`FlexFileError`] with file, line, column, element, value found and value expected.
 pub fn read_flex(path: impl AsRef<Path>) -> Result<ReducedLink, FlexFileError> {
@@ -131,6 +133,7 @@ fn check_format(root: &Table<'_, '_>) -> Result<(), FlexFileError> {
     Ok(())
 }
 
+/// Reads `[provenance]`; the units are those of the file unless it names the original ones.
 fn read_provenance(root: &Table<'_, '_>, units: &Units) -> Result<Provenance, FlexFileError> {
     let mut provenance = Provenance { units: units.names.clone(), ..Provenance::default() };
     let Some(node) = root.get("provenance") else { return Ok(provenance) };
@@ -151,6 +154,7 @@ fn read_provenance(root: &Table<'_, '_>, units: &Units) -> Result<Provenance, Fl
     Ok(provenance)
 }
 
+/// Reads the two parts, in any order.
 fn read_parts(root: &Table<'_, '_>, units: &Units) -> Result<[RigidPart; 2], FlexFileError> {
     let node = root.require("part", "give two [[part]] tables, \"proximal\" and \"distal\"")?;
     let mut found: [Option<RigidPart>; 2] = [None, None];
@@ -173,6 +177,10 @@ fn read_parts(root: &Table<'_, '_>, units: &Units) -> Result<[RigidPart; 2], Fle
     Ok([proximal, distal])
 }
 
+/// Reads `[stiffness]` and makes the link, with the matrix in SI and link axes.
+///
+/// # Errors
+/// [`FlexFileError`] for an entry that is wrong or missing, and for a matrix that fails the gate.
 fn read_stiffness(
     root: &Table<'_, '_>,
     units: &Units,
@@ -194,6 +202,7 @@ fn read_stiffness(
         .require("order", "the order of rows and columns is never guessed")?
         .word(&[ORDER], "reorder rows and columns: linear first, then angular")?;
 
+    // R_LF: axes F of the matrix in the link.
     let R = match axes {
         "interface_A" => *frames.X_LA.rotation.matrix(),
         "interface_B" => *frames.X_LB.rotation.matrix(),
@@ -204,6 +213,7 @@ fn read_stiffness(
         if axes == "link" { K } else { turn6(&R) * K * turn6(&R).transpose() }
     };
 
+    // K_BB of a 6×6; all four blocks of a 12×12, each in its units.
     let node = table.require("matrix", "one array per row")?;
     let link = if kind == "6x6" {
         let K_BB = turn(units.stiffness(&Matrix6::from_fn({
@@ -227,6 +237,7 @@ fn read_stiffness(
     link.map_err(|cause| node.refused(cause, "a symmetric, positive definite stiffness of a free link"))
 }
 
+/// Reads an N×N matrix by rows, in the units of the file.
 fn read_square<const N: usize>(node: &Node<'_, '_>) -> Result<[[f64; N]; N], FlexFileError> {
     let mut rows = [[0.0; N]; N];
     let items = node.items(N, "rows, one per component")?;

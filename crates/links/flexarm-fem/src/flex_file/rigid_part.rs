@@ -8,12 +8,16 @@ use super::text::numbers;
 use super::units::Units;
 use crate::rigid_part::RigidPart;
 
+/// Writes mass (kg), centre of mass (m) and inertia about it (kg·m²), link axes.
 pub(super) fn inertial(part: &RigidPart) -> String {
     let I = &part.inertia;
     let moments = [I[(0, 0)], I[(1, 1)], I[(2, 2)], I[(0, 1)], I[(0, 2)], I[(1, 2)]];
     format!("mass = {:?}\ncom = {}\ninertia = {}\n", part.mass, numbers(part.com.iter()), numbers(moments.iter()),)
 }
 
+/// Reads and checks the mass properties of a part, in SI, link axes.
+///
+/// * `name`: of the part, in messages.
 pub(super) fn read_inertial(
     item: &Node<'_, '_>,
     table: &Table<'_, '_>,

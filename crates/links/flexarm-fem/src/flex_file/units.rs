@@ -16,6 +16,7 @@ pub(super) struct Units {
 }
 
 impl Units {
+    /// Reads `[units]`; every unit except that of angles must be declared.
     pub(super) fn read(table: &Table<'_, '_>) -> Result<Self, FlexFileError> {
         table.only(&["length", "force", "mass", "angle"])?;
         let one = |key: &str, known: &[(&'static str, f64)]| {
@@ -50,6 +51,7 @@ impl Units {
         self.length == 1.0 && self.force == 1.0 && self.mass == 1.0
     }
 
+    /// Unit of inertia, kg·m².
     pub(super) fn inertia(&self) -> f64 {
         self.mass * self.length * self.length
     }

@@ -40,6 +40,7 @@ pub fn write_flex(link: &ReducedLink) -> String {
     text
 }
 
+/// Writes `[provenance]` without empty entries.
 fn provenance(p: &Provenance) -> String {
     let entries = [
         ("source", &p.source),
@@ -60,6 +61,7 @@ fn pose(name: &str, X: &Pose) -> String {
     format!("\n[{name}]\n{}", pose_lines(X))
 }
 
+/// Writes the measures that a 6×6 cannot repeat.
 fn checks(link: &ReducedLink) -> String {
     let entries = [
         ("asymmetry", Some(link.checks.asymmetry)),

@@ -126,6 +126,7 @@ impl std::fmt::Display for Hinge {
     }
 }
 
+/// Arrangement of points, from their principal second moments.
 fn shape(points: &[Vector3<f64>]) -> &'static str {
     let centre = points.iter().sum::<Vector3<f64>>() / points.len().max(1) as f64;
     let spread: Matrix3<f64> = points.iter().map(|p| (p - centre) * (p - centre).transpose()).sum();

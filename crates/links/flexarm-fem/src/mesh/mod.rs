@@ -168,7 +168,10 @@ impl Mesh {
         self.blocks.iter().map(ElementBlock::len).sum()
     }
 
-    /// Transforms the nodes from frame M into frame L; the axes of beam sections rotate with them.
+    /// Transforms the mesh from frame M into frame L: `p_L = X_LM p_M`; the y axes of beam sections
+    /// rotate with the nodes.
+    ///
+    /// * `X_LM`: pose of the mesh frame in L, m.
     pub fn transformed(mut self, X_LM: &flexarm_spatial::Pose) -> Self {
         for p in &mut self.nodes {
             *p = X_LM.rotation * *p + X_LM.translation.vector;
@@ -188,7 +191,8 @@ impl Mesh {
         used
     }
 
-    /// Bounding box of the nodes that elements use, `(min, max)`, m; `None` without elements.
+    /// Bounding box of the nodes that elements use, `(min, max)`, m, mesh axes; `None` without
+    /// elements.
     pub fn bounding_box(&self) -> Option<(Vector3<f64>, Vector3<f64>)> {
         let used = self.used_nodes();
         let mut points = self.nodes.iter().zip(&used).filter(|(_, used)| **used).map(|(p, _)| *p);

@@ -88,6 +88,7 @@ pub fn select(mesh: &Mesh, selector: &NodeSelector, length_unit: f64) -> Result<
     chooser.choose(selector)
 }
 
+/// Evaluation of selectors on one mesh.
 struct Chooser<'a> {
     mesh: &'a Mesh,
     used: Vec<bool>,
@@ -100,6 +101,7 @@ struct Chooser<'a> {
 }
 
 impl Chooser<'_> {
+    /// Nodes of a selector, sorted.
     fn choose(&mut self, selector: &NodeSelector) -> Result<Vec<u32>, SelectError> {
         match selector {
             NodeSelector::Set(name) => self.set(name),
@@ -125,6 +127,7 @@ impl Chooser<'_> {
         }
     }
 
+    /// Nodes that are in every term.
     fn all(&mut self, selector: &NodeSelector, terms: &[NodeSelector]) -> Result<Vec<u32>, SelectError> {
         let mut common: Option<Vec<u32>> = None;
         let mut counts = Vec::new();
@@ -194,6 +197,8 @@ impl Chooser<'_> {
     }
 
     /// Nodes of the skin and of beams within `tolerance` of a place.
+    ///
+    /// * `tolerance`: in the unit of lengths; `distance`: of a point from the place, both m.
     fn near(
         &mut self,
         selector: &NodeSelector,

@@ -137,6 +137,8 @@ impl Skin {
     }
 
     /// Skin as plane triangles with all its nodes, for pictures: 1, 2, 4 or 6 per face.
+    ///
+    /// Returns node indices, counter-clockwise seen from outside.
     pub fn triangles(&self) -> Vec<[u32; 3]> {
         let mut triangles = Vec::with_capacity(4 * self.len());
         for face in self.faces() {

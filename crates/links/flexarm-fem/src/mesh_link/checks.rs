@@ -85,6 +85,14 @@ fn rigid_motions(element: &Superelement) -> DMatrix<f64> {
     rigid_motions_about(element, &((p(0) + p(1)) / 2.0))
 }
 
+/// Rigid motions of the interfaces: three translations, three rotations about a point.
+///
+/// ```text
+/// u_I = v + w × (p_LI - point),   θ_I = w
+/// ```
+/// * `point`: link axes, m.
+///
+/// Returns six rows per interface (m, rad; at Io, link axes) and six columns `[v; w]`.
 pub(crate) fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) -> DMatrix<f64> {
     let mut R = DMatrix::zeros(element.boundary(), 6);
     for (k, interface) in element.interfaces.iter().enumerate() {
@@ -96,7 +104,16 @@ pub(crate) fn rigid_motions_about(element: &Superelement, point: &Vector3<f64>) 
     R
 }
 
-/// Mass, centre of mass and inertia of the reduced mass matrix: `Rᵀ M R` about the link origin.
+/// Mass properties that the reduced mass matrix implies.
+///
+/// ```text
+/// Rᵀ M R = [  m 1     -m [c]x ]      R: rigid motions of the interfaces about Lo
+///          [ m [c]x     I_Lo  ]
+/// ```
+/// * `element`: link axes, SI. A rigid motion has no modal part, so the modes do not count.
+///
+/// Returns mass (kg), centre of mass from Lo (m) and inertia about it (kg·m²), link axes; not
+/// checked.
 pub fn condensed_body(element: &Superelement) -> RigidPart {
     let n = element.boundary();
     let R = rigid_motions_about(element, &Vector3::zeros());
@@ -115,6 +132,8 @@ pub(super) fn implausible(mesh: &Mesh, whole: &RigidPart, held: &Modes) -> Vec<F
     let size = mesh.bounding_box().map_or(0.0, |(low, high)| (high - low).amax());
     let first = held.frequencies_hz().first().copied();
     let mut findings = Vec::new();
+    // A value outside its range gives one warning; `slip` names the wrong unit that would explain
+    // it.
     let mut see = |what: &str, value: f64, unit: &str, low: f64, high: f64, slip: &str| {
         if !(low..=high).contains(&value) {
             let said = format!(

@@ -77,6 +77,7 @@ pub(super) fn suspicious(mesh: &Mesh, bodies: &Bodies) -> Vec<Finding> {
     findings
 }
 
+/// Rejects meshes whose neighbouring elements do not fit together, with the first five pairs.
 pub(super) fn check_fit(mesh: &Mesh) -> Result<(), MeshLinkError> {
     let misfits = misfits(mesh);
     if misfits.is_empty() {
@@ -90,6 +91,7 @@ pub(super) fn check_fit(mesh: &Mesh) -> Result<(), MeshLinkError> {
     Err(MeshLinkError::Misfit { count: misfits.len(), list: list.join(", ") })
 }
 
+/// Rejects meshes of several unconnected parts, with the first six of them.
 pub(super) fn check_connected(mesh: &Mesh) -> Result<(), MeshLinkError> {
     let parts = connected_parts(mesh);
     if parts.len() < 2 {

@@ -1,8 +1,9 @@
 //! Turns a mesh with named interfaces into a checked flexible link, in one call.
 //!
 //! ```text
-//! mesh --assemble--> K, M --tie, factorise--> K_g, M_g, modes --+--> ReducedLink (K_BB, two parts, chains)
-//!                                                               +--> MeshGate: checks, with numbers
+//! mesh --assemble--> K, M --tie, factorise--> K_g, M_g, modes
+//!   K_g, M_g, modes --> ReducedLink: K_BB, two parts, chains, modal link
+//!                   --> MeshGate: checks, with numbers
 //! ```
 //! Start at [`reduce_mesh`]. Everything is in link axes and SI; a mesh in another frame is
 //! transformed first ([`Mesh::transformed`]).
@@ -70,8 +71,8 @@ pub struct LinkPlan {
     /// Whether to compute the geometric stiffness of the modal link; 12 more solves and a pass over
     /// all elements.
     pub geometric: bool,
-    /// Whether to compute the stress at the nodes of the surface; 12 more solves and a pass over all
-    /// elements.
+    /// Whether to compute the stress at the nodes of the surface; 12 more solves and a pass over
+    /// all elements.
     pub stress: bool,
     /// Number of modes with A clamped against which the reduced models are checked.
     pub judged_modes: usize,
@@ -134,9 +135,15 @@ impl ReductionStep {
     }
 }
 
-/// Reduces `mesh`, given in link axes, to a link.
+/// Reduces a mesh to a link.
 ///
+/// * `mesh`: link axes, m.
+/// * `plan`: interfaces, materials, modes and split; link axes, SI.
 /// * `step`: called at the start of each step.
+///
+/// Returns the link with its superelement, chains, modal link and checks, link axes. Cost: one
+/// sparse factorisation of the free DoF, and one solve per static shape, Lanczos vector and inertia
+/// load.
 ///
 /// # Errors
 /// [`MeshLinkError`].

@@ -1,7 +1,7 @@
 //! Cut of the mesh into the two parts of a link, and bodies attached to them.
 //!
 //! Start at [`split`]; [`SplitAt`] says where. Link axes. Not here: the volume of cut elements
-//! ([`crate::cut`]).
+//! ([`cut`](crate::cut())).
 
 use flexarm_spatial::{Matrix12, Pose, symmetric_part};
 use nalgebra::{DMatrix, Matrix6, Vector3};
@@ -33,6 +33,11 @@ pub enum SplitAt {
 }
 
 /// Split frame and the two parts. The cut is through S, perpendicular to AB.
+///
+/// * `densities`: one per region, kg/m³.
+/// * `K12`: stiffness of A and B, 12×12, link axes, for the elastic centre.
+///
+/// Returns the frames with S in link axes, and the proximal and distal part, link axes.
 pub(super) fn split(
     mesh: &Mesh,
     densities: &[f64],
@@ -58,10 +63,10 @@ pub(super) fn split(
 /// Merges attached bodies into the part of the interface on whose side of the split they are, so
 /// that the two-part link, chains and modal links carry them alike.
 pub(super) fn attach(attached: &[RigidPart], link: &mut ReducedLink, chains: &mut [Chain]) -> Result<(), FemError> {
-    let (along, p_LS) = (link.p_AB(), link.split.X_LS.translation.vector);
+    let (p_AB, p_LS) = (link.p_AB(), link.split.X_LS.translation.vector);
     for body in attached {
         body.check("an attached body")?;
-        let is_beyond = (body.com - p_LS).dot(&along) > 0.0;
+        let is_beyond = (body.com - p_LS).dot(&p_AB) > 0.0;
         let part = if is_beyond { &mut link.distal } else { &mut link.proximal };
         *part = part.merged(body);
         for chain in chains.iter_mut() {
@@ -74,8 +79,9 @@ pub(super) fn attach(attached: &[RigidPart], link: &mut ReducedLink, chains: &mu
     Ok(())
 }
 
-/// Returns the split point, link axes, and a message if it is not the requested one.
+/// Returns the split point `p_LS` (m, link axes), and a message if it is not the requested one.
 ///
+/// * `K12`: stiffness of A and B, 12×12, link axes; only its block `K_BB` is used.
 /// * `possible`: whether a cut at a point leaves two parts.
 pub(crate) fn split_point(
     frames: &LinkFrames,
@@ -83,17 +89,18 @@ pub(crate) fn split_point(
     at: SplitAt,
     possible: &dyn Fn(Vector3<f64>) -> bool,
 ) -> (Vector3<f64>, Option<String>) {
-    let (p_LA, p_LB, along) = (frames.X_LA.translation.vector, frames.X_LB.translation.vector, frames.p_AB());
-    let middle = p_LA + along * 0.5;
+    let (p_LA, p_LB, p_AB) = (frames.X_LA.translation.vector, frames.X_LB.translation.vector, frames.p_AB());
+    let middle = p_LA + p_AB * 0.5;
     match at {
         SplitAt::MidLength => (middle, None),
-        SplitAt::Fraction(fraction) => (p_LA + along * fraction, None),
+        SplitAt::Fraction(fraction) => (p_LA + p_AB * fraction, None),
         SplitAt::Point(point) => (point, None),
         SplitAt::ElasticCentre => {
             let K_BB = DMatrix::from_fn(6, 6, |i, j| K12[(6 + i, 6 + j)]);
-            let C = spd_inverse(&K_BB).map(|C| symmetric_part(&Matrix6::from_column_slice(C.as_slice())));
-            let centre = C.and_then(|C| centre_of_compliance(&C, &p_LB));
-            let fraction = |p: &Vector3<f64>| (p - p_LA).dot(&along) / along.norm_squared();
+            let C_BB = spd_inverse(&K_BB).map(|C| symmetric_part(&Matrix6::from_column_slice(C.as_slice())));
+            let centre = C_BB.and_then(|C_BB| centre_of_compliance(&C_BB, &p_LB));
+            let fraction = |p_L: &Vector3<f64>| (p_L - p_LA).dot(&p_AB) / p_AB.norm_squared();
+            // Not near an end, where one part would be almost empty.
             match centre.filter(|p| (0.1..=0.9).contains(&fraction(p)) && possible(*p)) {
                 Some(centre) => (centre, None),
                 None => {

@@ -46,6 +46,9 @@ impl BeamLink {
 
     /// Computes the modal link of this beam with options.
     ///
+    /// Returns six coordinates of B, then [`ModalOptions::modes`] fixed-interface modes; link axes
+    /// about Lo, SI. The static stiffness is that of the closed form.
+    ///
     /// # Errors
     /// [`FemError::OutOfRange`] for impossible dimensions, materials and masses, too few elements
     /// and too many modes, [`FemError::Missing`] for a section without shear stiffness in
@@ -66,6 +69,7 @@ impl BeamLink {
             return Err(range("number of fixed-interface modes", options.modes, allowed));
         }
 
+        // Mesh of the beam, model, condensation to A and B, and modes.
         let mesh = self.elements(m)?;
         let assembly = AssemblyOptions::default();
         let refused = |step, cause: &dyn Display| FemError::BeamElements { step, cause: cause.to_string() };

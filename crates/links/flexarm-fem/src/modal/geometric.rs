@@ -76,6 +76,7 @@ impl Field {
         }
     }
 
+    /// Acceleration at the position s, both in link axes.
     fn at(&self, s: &Vector3<f64>) -> Vector3<f64> {
         self.A * s + self.b
     }
@@ -83,7 +84,9 @@ impl Field {
 
 /// Computes the geometric stiffness of all unit loads.
 ///
-/// * `shapes`: displacements of all DoF per coordinate.
+/// * `shapes`: displacements of all DoF per coordinate, link axes.
+///
+/// Returns one n×n matrix per load for n coordinates, symmetric.
 pub(super) fn geometric_stiffness(
     source: &ModalSource<'_>,
     beams: &[BeamElement],
@@ -110,6 +113,7 @@ pub(super) fn geometric_stiffness(
     }
     add_ties(source, &on_mesh, &mut G);
 
+    // Matrices in the order of the loads.
     let mut G = G.into_iter().map(|G| symmetric_part(&G));
     let mut next = || G.next().unwrap_or_else(|| DMatrix::zeros(n, n));
     GeometricStiffness {
@@ -120,14 +124,15 @@ pub(super) fn geometric_stiffness(
     }
 }
 
-/// Displacements of all DoF with A clamped under the inertia loads, then under unit wrenches on the
-/// interfaces after the first.
+/// Displacements of all DoF (m, rad; link axes) with A clamped, under the [`FIELDS`] inertia loads,
+/// then under unit wrenches on the interfaces after the first.
 pub(super) fn displacements_under_loads(source: &ModalSource<'_>) -> DMatrix<f64> {
     let beams = source.beams();
     let beam_forces: Vec<_> = beams.iter().map(element_forces).collect();
     displacements(source, &inertia_forces(source, &beams, &beam_forces))
 }
 
+/// As [`displacements_under_loads`], for given inertia forces.
 fn displacements(source: &ModalSource<'_>, F: &DMatrix<f64>) -> DMatrix<f64> {
     let wrenches = source.condensation.unit_load_shapes();
     let mut U = DMatrix::zeros(F.nrows(), FIELDS + wrenches.ncols());
@@ -138,16 +143,16 @@ fn displacements(source: &ModalSource<'_>, F: &DMatrix<f64>) -> DMatrix<f64> {
     U
 }
 
-/// Inertia forces on the DoF.
+/// Inertia forces on all DoF, link axes (N, N·m), one column per field.
 ///
-/// * `beam_forces`: those of each beam element, beam axes, for the internal forces.
+/// * `beam_forces`: those of each beam element, 12 rows, beam axes.
 fn inertia_forces(source: &ModalSource<'_>, beams: &[BeamElement], beam_forces: &[DMatrix<f64>]) -> DMatrix<f64> {
     let mut F = solid_forces(source);
     for (beam, forces) in beams.iter().zip(beam_forces) {
         for (i, dof) in beam.dofs.iter().enumerate() {
             let corner = i / 3 * 3;
             for j in 0..FIELDS {
-                let turned = beam.R * forces.fixed_view::<3, 1>(corner, j);
+                let turned = beam.R_LE * forces.fixed_view::<3, 1>(corner, j);
                 F[(*dof, j)] += turned[i - corner];
             }
         }
@@ -173,15 +178,15 @@ fn solid_forces(source: &ModalSource<'_>) -> DMatrix<f64> {
 fn element_forces(element: &BeamElement) -> DMatrix<f64> {
     let (l, mu) = (element.beam.length(), element.beam.bar().mass_per_length);
     let D = element.section_moments();
-    let Rt = element.R.transpose();
+    let R_EL = element.R_LE.transpose();
     let mut F = DMatrix::zeros(12, FIELDS);
     for (xi, weight) in gauss4() {
         let section = element.beam.section_at(xi);
         let s = element.point(xi);
         for j in 0..FIELDS {
             let field = Field::unit(j);
-            let force = Rt * field.at(&s) * mu;
-            let torque = Rt * axial(&(D * field.A.transpose()));
+            let force = R_EL * field.at(&s) * mu;
+            let torque = R_EL * axial(&(D * field.A.transpose()));
             let nodal = section.u.transpose() * force + section.theta.transpose() * torque;
             F.column_mut(j).axpy(-weight * l, &nodal, 1.0);
         }
@@ -189,6 +194,7 @@ fn element_forces(element: &BeamElement) -> DMatrix<f64> {
     F
 }
 
+/// Adds `∫ Σ_c ∇φ_k,cᵀ σ ∇φ_l,c dV` over the solids, for the stress σ of each column of `U`.
 fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>, G: &mut [DMatrix<f64>]) {
     let model = source.condensation.model();
     let (n, loads) = (shapes.ncols(), U.ncols());
@@ -227,6 +233,7 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
                 let (p, c, b) = entry(row);
                 right[p * n + k][(c, b)]
             });
+            // G += A B with A[k, (p, c, b)] = (∇φ_k σ_p w_p)_cb, B[(p, c, b), l] = (∇φ_l)_cb.
             for (j, G) in G.iter_mut().enumerate() {
                 let stressed: Vec<_> = (0..points * n).map(|at| right[at] * stresses[at / n * loads + j]).collect();
                 let A = DMatrix::from_fn(n, 9 * points, |k, row| {
@@ -239,6 +246,10 @@ fn add_solids(source: &ModalSource<'_>, U: &DMatrix<f64>, shapes: &DMatrix<f64>,
     }
 }
 
+/// Adds the work of the internal forces of one beam element; see the module.
+///
+/// * `forces`: its inertia forces, 12 rows, beam axes.
+/// * `U`: displacements of all DoF under each load; `shapes`: per coordinate.
 fn add_beam(
     element: &BeamElement,
     forces: &DMatrix<f64>,

@@ -12,15 +12,18 @@
 //! depends on η:
 //!
 //! ```text
-//! C_t,k = ∫ φ_k dm    C_r,k = ∫ s × φ_k dm    P_k = ∫ s φ_kᵀ dm    N_kl = ∫ φ_k φ_lᵀ dm    M_kl = ∫ φ_k·φ_l dm
-//! C_r,k = axial(P_k),   M_kl = tr N_kl,   N_lk = N_klᵀ           axial(A)_x = A_yz - A_zy, ...
+//! C_t,k = ∫ φ_k dm        C_r,k = ∫ s × φ_k dm      P_k = ∫ s φ_kᵀ dm
+//! N_kl = ∫ φ_k φ_lᵀ dm    M_kl = ∫ φ_k·φ_l dm
+//!
+//! C_r,k = axial(P_k),     M_kl = tr N_kl,           N_lk = N_klᵀ
+//! axial(A)_x = A_yz - A_zy, ...
 //! ```
 //! These three identities hold for solids and for beams with plane sections: there `φ = u + θ × r`
 //! at the position r in the section, so all of them include the rotary inertia.
 //!
 //! | from | with |
 //! | --- | --- |
-//! | a mesh | [`ModalSource`], in [`LinkDetails::modal`](crate::LinkDetails) after [`reduce_mesh`](crate::reduce_mesh) |
+//! | a mesh | [`ModalSource`]; [`reduce_mesh`](crate::reduce_mesh) calls it |
 //! | a uniform beam | [`BeamLink::modal`](crate::BeamLink::modal) |
 //! | a condensed stiffness and mass | [`ModalLink::from_superelement`]: first order only |
 //! | Standard Input Data | `flexarm_fe_io::exchange::modal_link_from_sid` |
@@ -119,7 +122,8 @@ impl ModalLink {
         self.K.nrows()
     }
 
-    /// Rigid body of the undeformed link: mass, centre of mass, inertia about the centre of mass.
+    /// Rigid body of the undeformed link: mass (kg), centre of mass from Lo (m) and inertia about
+    /// the centre of mass (kg·m²), link axes.
     pub fn rigid(&self) -> RigidPart {
         let com = self.first_moment / self.mass;
         let c = com.cross_matrix();
@@ -131,14 +135,18 @@ impl ModalLink {
         self.coordinates() == 0 || self.N.iter().any(|N| N.amax() > 0.0)
     }
 
-    /// Mass matrix over the motion of the link frame (linear, angular, link axes, at Lo) and the
-    /// coordinates, undeformed.
+    /// Mass matrix of the undeformed link over the acceleration of the link frame (linear, then
+    /// angular, at Lo, link axes) and of the coordinates.
     ///
     /// ```text
     /// [ m 1     -[mc]x   C_t ]
     /// [ [mc]x    J       C_r ]
     /// [ C_tᵀ     C_rᵀ    M   ]
     /// ```
+    /// Returns a symmetric matrix with 6 + n rows for n coordinates.
+    ///
+    /// # Source
+    /// [Shabana 2013], chapter 5.
     pub fn mass_matrix(&self) -> DMatrix<f64> {
         let n = self.coordinates();
         let mut M = DMatrix::zeros(6 + n, 6 + n);
@@ -155,14 +163,18 @@ impl ModalLink {
         M
     }
 
-    /// Natural frequencies with A clamped, Hz, ascending.
+    /// Natural frequencies with A clamped, Hz, ascending, one per coordinate.
+    ///
+    /// Empty if stiffness or mass is not positive definite.
     pub fn held_frequencies_hz(&self) -> Vec<f64> {
         transform::eigenpairs(&self.K, &self.M)
             .map_or_else(Vec::new, |pairs| pairs.omega.iter().map(|omega| omega / std::f64::consts::TAU).collect())
     }
 
-    /// Natural frequencies of the free link, Hz, ascending; the first six belong to rigid motions
-    /// and are near zero.
+    /// Natural frequencies of the free link: of `blkdiag(0, K)` and [`Self::mass_matrix`].
+    ///
+    /// Returns 6 + n frequencies, Hz, ascending; the first six belong to rigid motions and are near
+    /// zero. Empty if the mass is not positive definite.
     pub fn free_frequencies_hz(&self) -> Vec<f64> {
         let n = self.coordinates();
         let mut K = DMatrix::zeros(6 + n, 6 + n);
@@ -170,7 +182,14 @@ impl ModalLink {
         generalised_frequencies(&K, &self.mass_matrix())
     }
 
-    /// Compliance of an interface with A clamped, at Io, link axes.
+    /// Compliance of an interface with A clamped, `u_I = C_II F_I`.
+    ///
+    /// ```text
+    /// C_II = Φ_I K⁻¹ Φ_Iᵀ
+    /// ```
+    /// * `interface`: index into [`Self::interfaces`], from 0.
+    ///
+    /// Returns `C_II`, 6×6 (m/N, m/(N·m); rad/N, rad/(N·m)), at Io, link axes, exactly symmetric.
     ///
     /// # Errors
     /// [`FemError::OutOfRange`] if the interface does not exist, [`FemError::Missing`] for a
@@ -186,8 +205,8 @@ impl ModalLink {
         let loose = FemError::Missing { what: "stiffness of a coordinate", help: "it holds nothing" };
         let C = spd_inverse(&self.K).ok_or(loose)?;
         let Phi = DMatrix::from_column_slice(6, self.coordinates(), at.Phi.as_slice());
-        let C = &Phi * C * Phi.transpose();
-        Ok(symmetric_part(&nalgebra::Matrix6::from_column_slice(C.as_slice())))
+        let C_II = &Phi * C * Phi.transpose();
+        Ok(symmetric_part(&nalgebra::Matrix6::from_column_slice(C_II.as_slice())))
     }
 
     /// Whether mass and stiffness are positive definite, so that all frequencies with A clamped are
@@ -210,12 +229,18 @@ impl ModalLink {
 /// Products of ω in the order of the second-order loads: xx yy zz xy xz yz.
 pub const PRODUCTS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 
-/// Twice the axial vector of the skew part: gives `∫ s × φ dm` for `∫ s φᵀ dm`.
+/// Cross product of the two factors of an outer product: `axial(s φᵀ) = s × φ`, so that
+/// `∫ s × φ dm = axial(∫ s φᵀ dm)`.
+///
+/// ```text
+/// axial(A) = [A_yz - A_zy, A_zx - A_xz, A_xy - A_yx]
+/// ```
+/// Returns a vector in the axes and unit of A.
 pub fn axial(A: &Matrix3<f64>) -> Vector3<f64> {
     Vector3::new(A[(1, 2)] - A[(2, 1)], A[(2, 0)] - A[(0, 2)], A[(0, 1)] - A[(1, 0)])
 }
 
-/// Inertia about the origin for second moments `∫ s sᵀ dm`.
+/// Inertia `tr(S) 1 - S` about the origin for second moments `S = ∫ s sᵀ dm`, kg·m², same axes.
 pub(crate) fn inertia_of(S: &Matrix3<f64>) -> Matrix3<f64> {
     symmetric_part(&(Matrix3::identity() * S.trace() - S))
 }

@@ -1,13 +1,15 @@
 //! Computes the integrals of a modal link from a mesh and its condensation.
 //!
 //! ```text
-//! solids   u = Σ N_i u_i, one shape function in x, y, z:   ∫ s_a φ_b dm = x_aᵀ M_s φ_b,   ∫ φ_a φ_b dm = φ_aᵀ M_s φ_b
+//! solids   u = Σ N_i u_i, one shape function in x, y, z:
+//!          ∫ s_a φ_b dm = x_aᵀ M_s φ_b,     ∫ φ_a φ_b dm = φ_aᵀ M_s φ_b
 //! beams    φ = u + θ × r over the section, D = ∫ r rᵀ dm per length:
-//!          ∫ s φᵀ dm = ∫ (μ s uᵀ + D [θ]xᵀ) dx,   ∫ φ_k φ_lᵀ dm = ∫ (μ u_k u_lᵀ + [θ_k]x D [θ_l]xᵀ) dx
+//!          ∫ s φᵀ dm = ∫ (μ s uᵀ + D [θ]xᵀ) dx
+//!          ∫ φ_k φ_lᵀ dm = ∫ (μ u_k u_lᵀ + [θ_k]x D [θ_l]xᵀ) dx
 //! ```
 //! M_s, x and φ are those of the FE model, so both formulas are exact for its displacement field:
 //! for solids of any shape, and for beams with four Gauss points for the cubic shapes of
-//! [`Beam`](crate::Beam).
+//! [`Beam`].
 
 use flexarm_spatial::symmetric_part;
 use nalgebra::{DMatrix, Matrix3, Matrix3xX, Matrix6xX, Vector3};
@@ -44,21 +46,25 @@ pub struct ModalSource<'a> {
 /// Beam element of a mesh, with its position.
 pub(super) struct BeamElement {
     pub(super) beam: Beam,
-    /// Beam axes in link axes, as columns.
-    pub(super) R: Matrix3<f64>,
-    /// Position of its first node.
-    pub(super) start: Vector3<f64>,
+    /// Rotation of the beam axes E in the link.
+    pub(super) R_LE: Matrix3<f64>,
+    /// Position of its first node, link axes, m.
+    pub(super) p_LE: Vector3<f64>,
     /// DoF of both nodes.
     pub(super) dofs: [usize; 12],
 }
 
 impl BeamElement {
-    /// Extracts the rows of the element, beam axes.
+    /// Extracts the displacements of the two ends of the element, beam axes.
+    ///
+    /// * `U`: displacements of all DoF, link axes, one column per load or shape.
+    ///
+    /// Returns 12 rows and as many columns.
     pub(super) fn gather(&self, U: &DMatrix<f64>) -> DMatrix<f64> {
         let mut local = DMatrix::from_fn(12, U.ncols(), |i, j| U[(self.dofs[i], j)]);
         for mut column in local.column_iter_mut() {
             for corner in [0, 3, 6, 9] {
-                let turned = self.R.transpose() * column.fixed_rows::<3>(corner);
+                let turned = self.R_LE.transpose() * column.fixed_rows::<3>(corner);
                 column.fixed_rows_mut::<3>(corner).copy_from(&turned);
             }
         }
@@ -68,12 +74,13 @@ impl BeamElement {
     /// Second mass moments of the section per length, link axes, kg·m.
     pub(super) fn section_moments(&self) -> Matrix3<f64> {
         let bar = self.beam.bar();
-        self.R * Matrix3::from_diagonal(&Vector3::new(0.0, bar.rotary_z, bar.rotary_y)) * self.R.transpose()
+        let D_E = Matrix3::from_diagonal(&Vector3::new(0.0, bar.rotary_z, bar.rotary_y));
+        self.R_LE * D_E * self.R_LE.transpose()
     }
 
-    /// Position on the centre line, link axes, m.
+    /// Position `p_L` of the centre line at `xi = x/l`, m.
     pub(super) fn point(&self, xi: f64) -> Vector3<f64> {
-        self.start + self.R.column(0) * (xi * self.beam.length())
+        self.p_LE + self.R_LE.column(0) * (xi * self.beam.length())
     }
 }
 
@@ -91,6 +98,10 @@ struct Integrals {
 impl ModalSource<'_> {
     /// Computes the modal link.
     ///
+    /// Returns shapes, integrals, stiffness and mass over six coordinates per interface after A and
+    /// one per fixed-interface mode, link axes about Lo, SI.
+    ///
+    /// * `name`: of the link.
     /// * `geometric`: whether to compute the geometric stiffness: 12 more solves, and a pass over
     ///   the elements.
     pub fn modal_link(&self, name: impl Into<String>, geometric: bool) -> ModalLink {
@@ -142,6 +153,9 @@ impl ModalSource<'_> {
 
     /// Displacements of all DoF with A clamped: under unit wrenches on the interfaces after the
     /// first, under the inertia loads, and in the fixed-interface modes.
+    ///
+    /// Returns one row per DoF of the model (m, rad; link axes) and one column per unit load, in
+    /// the order of [`StressFields::stress`](crate::stress::StressFields).
     pub fn displacements(&self) -> DMatrix<f64> {
         let (under_loads, modes) = (geometric::displacements_under_loads(self), &self.fixed_modes.shapes);
         let wrenches = under_loads.ncols() - geometric::FIELDS;
@@ -152,7 +166,8 @@ impl ModalSource<'_> {
         U
     }
 
-    /// Displacements of all DoF per coordinate, A clamped.
+    /// Displacements φ of all DoF per coordinate, A clamped, link axes: static shapes of the
+    /// interfaces after the first, then modes.
     pub(super) fn shapes(&self) -> DMatrix<f64> {
         let (T, modes) = (self.condensation.shapes(), &self.fixed_modes.shapes);
         let statics = T.ncols() - 6;
@@ -172,6 +187,7 @@ impl ModalSource<'_> {
         self.interfaces[1..].iter().enumerate().map(one).collect()
     }
 
+    /// Beam elements of the mesh, with the axes of their sections.
     pub(super) fn beams(&self) -> Vec<BeamElement> {
         let model = self.condensation.model();
         let mut beams = Vec::new();
@@ -184,8 +200,8 @@ impl ModalSource<'_> {
                 let dof = |i: usize| model.dofs.of(nodes[i / 6] as usize).start + i % 6;
                 beams.push(BeamElement {
                     beam,
-                    R: Q.fixed_view::<3, 3>(0, 0).into_owned(),
-                    start: self.mesh.nodes[nodes[0] as usize],
+                    R_LE: Q.fixed_view::<3, 3>(0, 0).into_owned(),
+                    p_LE: self.mesh.nodes[nodes[0] as usize],
                     dofs: std::array::from_fn(dof),
                 });
             }
@@ -213,6 +229,7 @@ fn rows_of(model: &FeModel, axis: usize, A: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 impl Integrals {
+    /// Adds the integrals over the solids; see the module.
     fn add_solids(&mut self, model: &FeModel, shapes: &DMatrix<f64>) {
         let n = shapes.ncols();
         let M_shapes = model.M.solid_product(shapes);
@@ -251,6 +268,7 @@ impl Integrals {
         }
     }
 
+    /// Adds the integrals over one beam element, by four Gauss points; see the module.
     fn add_beam(&mut self, element: &BeamElement, shapes: &DMatrix<f64>) {
         let n = shapes.ncols();
         let (l, mu) = (element.beam.length(), element.beam.bar().mass_per_length);
@@ -259,13 +277,14 @@ impl Integrals {
         for (xi, weight) in gauss4() {
             let w = weight * l;
             let section = element.beam.section_at(xi);
-            let U = element.R * (section.u * &ends);
-            let theta = element.R * (section.theta * &ends);
+            let U = element.R_LE * (section.u * &ends);
+            let theta = element.R_LE * (section.theta * &ends);
             let s = element.point(xi);
 
             self.mass += w * mu;
             self.first += s * (w * mu);
             self.second += (s * s.transpose() * mu + D) * w;
+            // [θ_k]x of each coordinate.
             let turns: Vec<Matrix3<f64>> = (0..n).map(|k| theta.column(k).into_owned().cross_matrix()).collect();
             for k in 0..n {
                 let u_k = U.column(k);

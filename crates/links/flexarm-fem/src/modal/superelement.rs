@@ -21,7 +21,11 @@ use crate::reduction::Superelement;
 impl ModalLink {
     /// Modal link of a superelement without a mesh; second-order terms are unknown and zero.
     ///
-    /// * `element`: link axes, SI, proximal interface first.
+    /// * `name`: of the link.
+    /// * `element`: stiffness and mass, link axes, SI, proximal interface first.
+    ///
+    /// Returns the link with A clamped: the rows of `element` after the first six are its
+    /// coordinates.
     ///
     /// # Errors
     /// [`FemError::Missing`] for a single interface or an unusable stiffness or mass; errors of
@@ -39,6 +43,7 @@ impl ModalLink {
             return Err(FemError::Missing { what: "a usable stiffness and mass", help });
         }
 
+        // Momentum of the coordinates and of the whole body under rigid motions about Lo.
         let mut R = DMatrix::zeros(all, 6);
         R.rows_mut(0, element.boundary()).copy_from(&rigid_motions_about(element, &Vector3::zeros()));
         let momentum = R.transpose() * &element.M;

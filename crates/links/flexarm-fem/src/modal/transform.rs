@@ -1,7 +1,7 @@
 //! Changes of coordinates of a modal link: orthogonalised, truncated, other frame, other axes.
 //!
-//! Start at [`ModalLink::orthogonalised`] and [`ModalLink::truncated`]. Link axes and Lo as in the module
-//! above; coordinates change by `η = V η'`, matrices by `Vᵀ A V`.
+//! Start at [`ModalLink::orthogonalised`] and [`ModalLink::truncated`]. Link axes and Lo as in the
+//! module above; coordinates change by `η = V η'`, matrices by `Vᵀ A V`.
 //!
 //! Not here: integrals over a mesh ([`super::ModalSource`]).
 
@@ -90,6 +90,7 @@ fn lower_factor(A: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(L)
 }
 
+/// Jacobi rotation of columns i and j: `[a_i, a_j] ← [cos a_i - sin a_j, sin a_i + cos a_j]`.
 fn turn(A: &mut DMatrix<f64>, i: usize, j: usize, cos: f64, sin: f64) {
     for row in 0..A.nrows() {
         let (x, y) = (A[(row, i)], A[(row, j)]);
@@ -101,6 +102,7 @@ fn turn(A: &mut DMatrix<f64>, i: usize, j: usize, cos: f64, sin: f64) {
 impl ModalLink {
     /// Transforms the link to its modes with A clamped: `K = diag(ω²)`, `M = 1`, ascending.
     ///
+    /// Returns the link in coordinates `η = V η'` with the mass-normalised modes V as columns.
     /// Stiffness and mass decouple, and the highest modes, which are not physical, can be dropped;
     /// dropping modes makes the interfaces stiffer under static loads.
     ///
@@ -133,7 +135,11 @@ impl ModalLink {
         })
     }
 
-    /// Keeps only the first `modes` fixed-interface modes of the link.
+    /// Keeps only the first fixed-interface modes of the link.
+    ///
+    /// * `modes`: number of modes to keep, after the six coordinates of each interface.
+    ///
+    /// The static stiffness over the interfaces is unchanged.
     ///
     /// # Errors
     /// [`FemError::Missing`] if the coordinates are not of Craig-Bampton type,
@@ -179,7 +185,10 @@ impl ModalLink {
     /// The stiffness is unchanged. The geometric stiffness belongs to the previous support and is
     /// dropped. Unknown second-order terms stay unknown.
     ///
-    /// * `motion`: c_k (at Lo) over θ_k, link axes, one column per coordinate.
+    /// * `motion`: `c_k` (m, at Lo) over `θ_k` (rad), link axes, per unit of each coordinate: 6×n.
+    ///
+    /// # Panics
+    /// If `motion` has fewer columns than the link has coordinates.
     pub fn without_rigid_motion(self, motion: &Matrix6xX<f64>) -> Self {
         let n = self.coordinates();
         let (m, mc) = (self.mass, self.first_moment);
@@ -189,6 +198,7 @@ impl ModalLink {
         let theta: Vec<Vector3<f64>> = motion.column_iter().map(|q| q.fixed_rows::<3>(3).into_owned()).collect();
         let turn: Vec<Matrix3<f64>> = theta.iter().map(Vector3::cross_matrix).collect();
 
+        // First order: ∫ φ_k' dm and ∫ s φ_k'ᵀ dm.
         let (mut C_t, mut P, mut N, mut M) = (self.C_t.clone(), self.P.clone(), self.N.clone(), self.M.clone());
         for k in 0..n {
             C_t.column_mut(k).axpy(-1.0, &(c[k] * m + turn[k] * mc), 1.0);
@@ -202,6 +212,7 @@ impl ModalLink {
                 + turn[k] * mc * c[l].transpose()
                 + turn[k] * S * turn[l].transpose()
         };
+        // Second order: N' = N - ∫ φ_k ρ_lᵀ - ∫ ρ_k φ_lᵀ + ∫ ρ_k ρ_lᵀ, and M_kl' = tr N_kl'.
         for (k, l) in (0..n).flat_map(|k| (k..n).map(move |l| (k, l))) {
             let change = rigid(k, l) - mixed(k, l) - mixed(l, k).transpose();
             M[(k, l)] += change.trace();
@@ -211,6 +222,7 @@ impl ModalLink {
                 N[l * n + k] = N[k * n + l].transpose();
             }
         }
+        // Interfaces lose the rigid motion at Io.
         let interface = |i: &ModalInterface| {
             let mut Phi = i.Phi.clone();
             for (k, mut column) in Phi.column_iter_mut().enumerate() {
@@ -235,18 +247,20 @@ impl ModalLink {
         }
     }
 
-    /// Rotates the axes of the link about Lo; the coordinates are unchanged.
+    /// Expresses the link in other axes N at the same origin Lo; the coordinates are unchanged.
     ///
-    /// * `R`: rotation from the present axes to the new ones.
-    pub fn turned(&self, R: &Rotation3<f64>) -> Self {
-        let r = R.matrix();
-        let both = |A: &Matrix3<f64>| r * A * r.transpose();
-        let pose = |X: &Pose| Pose::from_parts(Translation3::from(r * X.translation.vector), R * X.rotation);
+    /// * `R_NL`: rotation from the present link axes L to the new axes N.
+    ///
+    /// Returns the link with vectors `R_NL v`, tensors `R_NL A R_NLᵀ`, and unit loads along N.
+    pub fn turned(&self, R_NL: &Rotation3<f64>) -> Self {
+        let R = R_NL.matrix();
+        let both = |A: &Matrix3<f64>| R * A * R.transpose();
+        let pose = |X: &Pose| Pose::from_parts(Translation3::from(R * X.translation.vector), R_NL * X.rotation);
         let interface = |i: &ModalInterface| {
             let mut Phi = i.Phi.clone();
             for mut column in Phi.column_iter_mut() {
                 for at in [0, 3] {
-                    let turned = r * column.fixed_rows::<3>(at);
+                    let turned = R * column.fixed_rows::<3>(at);
                     column.fixed_rows_mut::<3>(at).copy_from(&turned);
                 }
             }
@@ -255,19 +269,19 @@ impl ModalLink {
         let inertia = both(&self.inertia);
         Self {
             interfaces: self.interfaces.iter().map(interface).collect(),
-            first_moment: r * self.first_moment,
+            first_moment: R * self.first_moment,
             inertia: symmetric_part(&inertia),
-            C_t: r * &self.C_t,
-            C_r: r * &self.C_r,
+            C_t: R * &self.C_t,
+            C_r: R * &self.C_r,
             P: self.P.iter().map(both).collect(),
             N: self.N.iter().map(both).collect(),
-            geometric: self.geometric.as_ref().map(|G| turned(G, r)),
+            geometric: self.geometric.as_ref().map(|G| turned(G, R)),
             X_LA: pose(&self.X_LA),
             ..self.clone()
         }
     }
 
-    /// Changes coordinates by `η = V η'`; stiffness and mass transform as quadratic forms.
+    /// Changes coordinates by `η = V η'`, V n×m: shapes become `Φ V`, quadratic forms `Vᵀ A V`.
     pub(super) fn in_coordinates(&self, V: &DMatrix<f64>) -> Self {
         let (n, m) = V.shape();
         let form = |A: &DMatrix<f64>| symmetric_part(&(V.transpose() * A * V));
@@ -280,6 +294,7 @@ impl ModalLink {
                 N[i * m + j][(a, b)] = turned[(i, j)];
             }
         }
+        // Copying the transposed half makes N_ji = N_ijᵀ hold bit for bit.
         for i in 0..m {
             N[i * m + i] = (N[i * m + i] + N[i * m + i].transpose()) * 0.5;
             for j in 0..i {
@@ -304,13 +319,16 @@ impl ModalLink {
     }
 }
 
-/// Converts to unit loads along new axes; `R`: rotation from the present axes to the new ones.
+/// Converts to unit loads along new axes N.
+///
+/// * `R`: `R_NL`, from the present axes L to the new ones.
 fn turned(stiffness: &GeometricStiffness, R: &Matrix3<f64>) -> GeometricStiffness {
     // A load a along the new axes has the components Rᵀ a along the present ones.
     let three = |G: &[DMatrix<f64>]| -> [DMatrix<f64>; 3] {
         std::array::from_fn(|i| &G[0] * R[(i, 0)] + &G[1] * R[(i, 1)] + &G[2] * R[(i, 2)])
     };
     let six = |G: &[DMatrix<f64>; 6]| -> [DMatrix<f64>; 6] {
+        // Forces and torques turn alike.
         let [x, y, z] = three(&G[..3]);
         let [rx, ry, rz] = three(&G[3..]);
         [x, y, z, rx, ry, rz]

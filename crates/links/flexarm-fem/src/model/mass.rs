@@ -3,7 +3,7 @@
 //! Rows are DoF, kg, kg·m, kg·m². Start at [`MassMatrix::product`].
 //!
 //! Not here: masses of elements ([`crate::element`], [`crate::beam`]), mass properties of a body
-//! ([`crate::cut`]).
+//! ([`cut`](crate::cut())).
 
 use flexarm_spatial::Real;
 use nalgebra::DMatrix;
@@ -112,6 +112,7 @@ fn by_blocks(X: &DMatrix<f64>, Y: &mut DMatrix<f64>, product: impl Fn(&Block, &m
     }
 }
 
+/// `Y += M X` of the mass over nodes, applied to the three translations of each node at once.
 struct NodalProduct<'a> {
     nodal: &'a SparseSymmetric,
     first: &'a [u32],
@@ -124,6 +125,7 @@ impl Work for NodalProduct<'_> {
 
     #[inline(always)]
     fn run<T: Real, const P: usize>(self) {
+        // Column j of the lower triangle serves as row j too: sums into j, products of j below it.
         let pattern = self.nodal.pattern();
         for j in 0..self.nodal.size() {
             let entries = pattern.column(j);

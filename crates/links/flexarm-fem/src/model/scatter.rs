@@ -1,7 +1,7 @@
 //! Node adjacency of a mesh, and position of element matrix blocks in the sparse matrix.
 //!
-//! The pattern over nodes is expanded to DoF; blocks of an element are then added without a search per
-//! entry. Not here: the values, which the parent module adds.
+//! The pattern over nodes is expanded to DoF; blocks of an element are then added without a search
+//! per entry. Not here: the values, which the parent module adds.
 
 use std::sync::Arc;
 
@@ -22,9 +22,10 @@ pub(super) struct NodeGraph {
 }
 
 impl NodeGraph {
+    /// Builds the graph; cost and memory are linear in the number of elements.
     pub(super) fn new(mesh: &Mesh, dofs: &DofMap) -> Self {
         let n = mesh.nodes.len();
-        // Elements of each node.
+        // Elements of each node: counts, starts, then the lists.
         let elements: Vec<&[u32]> = mesh.blocks.iter().flat_map(|block| block.elements()).collect();
         let mut element_starts = vec![0_u32; n + 1];
         for nodes in &elements {

@@ -4,11 +4,11 @@
 //! rigid:         u_node = u_I + θ_I × (x_node - x_I)                           rows of B
 //! distributing:  θ_I = J⁻¹ Σ r × u,  u_I = mean u + θ_I × (x_I - c),  r = x - c     rows of G
 //! ```
-//! with c the mean of the nodes and `J = Σ (r² 1 - r rᵀ)`. Start at [`Boundary::tie`]. Mesh axes; the six
-//! columns of an interface are `ux uy uz rx ry rz` of its origin.
+//! with c the mean of the nodes and `J = Σ (r² 1 - r rᵀ)`. Start at [`Boundary::tie`]. Mesh axes;
+//! the six columns of an interface are `ux uy uz rx ry rz` of its origin.
 //!
-//! Not here: the selection of the nodes ([`crate::mesh::select`](crate::mesh::select())), the solution
-//! ([`super::Condensation`]).
+//! Not here: the selection of the nodes ([`crate::mesh::select`](crate::mesh::select())), the
+//! solution ([`super::Condensation`]).
 
 use flexarm_spatial::Pose;
 use nalgebra::{DMatrix, Matrix3, SymmetricEigen, Vector3};
@@ -118,7 +118,9 @@ pub struct Boundary {
 }
 
 impl Boundary {
-    /// Ties `interfaces`, proximal first, to a model.
+    /// Ties interfaces to a model: rows of B for rigid ties, of G for distributing ones.
+    ///
+    /// * `interfaces`: proximal first, two or more; poses in mesh axes, m.
     ///
     /// # Errors
     /// [`TieError`].
@@ -141,7 +143,8 @@ impl Boundary {
                 Tie::Rigid => {
                     for node in &interface.nodes {
                         let dofs = model.dofs.of(*node as usize);
-                        // u_node = u_I + θ_I × (x_node - x_I); rotations are those of the interface.
+                        // u_node = u_I + θ_I × (x_node - x_I); rotations are those of the
+                        // interface.
                         let turn = -(model.nodes[*node as usize] - origin).cross_matrix();
                         is_free[dofs.clone()].fill(false);
                         for (i, dof) in dofs.enumerate() {
@@ -165,6 +168,9 @@ impl Boundary {
     }
 
     /// Boundary of some DoF of the model itself: the reference nodes of an imported model.
+    ///
+    /// * `size`: number of DoF of the model.
+    /// * `dofs`: retained DoF, in the order of the boundary columns.
     pub fn retained(size: usize, dofs: &[u32]) -> Self {
         let rigid: Vec<_> = dofs.iter().enumerate().map(|(column, dof)| (*dof, column as u32, 1.0)).collect();
         let free = (0..size as u32).filter(|dof| !dofs.contains(dof)).collect();
@@ -191,7 +197,8 @@ impl Boundary {
         !self.rigid.is_empty()
     }
 
-    /// B: displacements of the DoF that follow an interface rigidly, one column per boundary DoF.
+    /// B: displacements of the DoF that follow an interface rigidly, per unit of each boundary DoF;
+    /// mesh axes, one row per DoF of the model.
     pub(super) fn rigid_part(&self) -> DMatrix<f64> {
         let mut B = DMatrix::zeros(self.size, self.columns);
         for (dof, column, factor) in &self.rigid {
@@ -201,6 +208,7 @@ impl Boundary {
     }
 }
 
+/// Checks number, names and nodes of the interfaces.
 fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
     if interfaces.len() < 2 {
         return Err(TieError::TooFew { found: interfaces.len() });
@@ -235,8 +243,8 @@ fn check(model: &FeModel, interfaces: &[Interface]) -> Result<(), TieError> {
     Ok(())
 }
 
-/// Mean position and second moments `Σ (r² 1 - r rᵀ)` of the nodes; an error if a rotation is
-/// unrestrained.
+/// Mean position c (m) and second moments `J = Σ (r² 1 - r rᵀ)` (m²) of the nodes, mesh axes; an
+/// error if a rotation is unrestrained.
 fn spread(model: &FeModel, interface: &Interface) -> Result<(Vector3<f64>, Matrix3<f64>), TieError> {
     let points: Vec<_> = interface.nodes.iter().map(|node| model.nodes[*node as usize]).collect();
     let count = points.len();
@@ -257,17 +265,19 @@ fn spread(model: &FeModel, interface: &Interface) -> Result<(Vector3<f64>, Matri
     Ok((centre, moments))
 }
 
-/// Rows of G of one distributing interface with equal weights:
-/// `u_c = mean u`, `theta = T⁻¹ Σ r x u`, `u_0 = u_c + theta x (p_0 - c)`.
+/// Rows of G of one distributing interface with equal weights; see the module.
+///
+/// * `column`: boundary column of its first component.
 fn mean_rows(model: &FeModel, interface: &Interface, column: usize) -> Vec<(usize, Vec<(u32, f64)>)> {
     let Ok((centre, moments)) = spread(model, interface) else { return Vec::new() };
     let Some(inverse) = moments.try_inverse() else { return Vec::new() };
     let weight = 1.0 / interface.nodes.len() as f64;
-    // theta x a = -[a]x theta
+    // u_I = mean u + θ_I × a = mean u - [a]x θ_I with a = x_I - c.
     let carry = -(interface.X_LI.translation.vector - centre).cross_matrix();
     let mut rows = vec![Vec::new(); 6];
     for node in &interface.nodes {
         let dofs = model.dofs.of(*node as usize);
+        // Share of this node in θ_I, and in u_I.
         let turn = inverse * (model.nodes[*node as usize] - centre).cross_matrix();
         let shift = Matrix3::identity() * weight + carry * turn;
         for j in 0..3 {

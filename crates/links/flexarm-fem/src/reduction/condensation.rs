@@ -4,8 +4,8 @@
 //! K_ii = L Lᵀ,   T = [-K_ii⁻¹ K_ib; 1],   K_g = Tᵀ K T,   M_g = Tᵀ M T
 //! K u + Gᵀ λ = F,  G u = g     distributing ties: λ from the Schur complement G K_ii⁻¹ Gᵀ
 //! ```
-//! Start at [`Condensation::new`]. Mesh axes; six boundary columns per interface, the first interface
-//! first; tall matrices have one row per DoF of the model.
+//! Start at [`Condensation::new`]. Mesh axes; six boundary columns per interface, the first
+//! interface first; tall matrices have one row per DoF of the model.
 //!
 //! Not here: ties ([`super::Boundary`]), the factor and the eigensolver ([`crate::sparse`]).
 
@@ -135,10 +135,19 @@ pub struct Condensation<'m> {
 }
 
 impl<'m> Condensation<'m> {
-    /// Ties the interfaces, factorises and computes the static shapes.
+    /// Ties the interfaces, factorises `K_ii` and computes the static shapes.
+    ///
+    /// * `interfaces`: proximal first, two or more; poses in mesh axes, m.
+    ///
+    /// Cost: one sparse Cholesky factorisation, and six solves per interface (twelve if its tie is
+    /// distributing).
     ///
     /// # Errors
-    /// [`ReductionError`].
+    /// [`ReductionError`]: a tie that is impossible, a part that moves freely, a factor that does
+    /// not fit into memory.
+    ///
+    /// # Source
+    /// [Guyan 1965].
     pub fn new(
         model: &'m FeModel,
         interfaces: &[Interface],
@@ -147,10 +156,10 @@ impl<'m> Condensation<'m> {
         Self::with_boundary(model, Boundary::tie(model, interfaces)?, options)
     }
 
-    /// As [`Self::new`], with a given boundary.
+    /// As [`Self::new`], with a given boundary of the same model.
     ///
     /// # Errors
-    /// [`ReductionError`].
+    /// As [`Self::new`].
     pub fn with_boundary(
         model: &'m FeModel,
         boundary: Boundary,
@@ -201,7 +210,8 @@ impl<'m> Condensation<'m> {
         Ok(this)
     }
 
-    /// Computes the static shapes and the condensed matrices.
+    /// Computes the static shapes T, `K_g = Tᵀ K T`, `M_g = Tᵀ M T` and the asymmetry of the
+    /// forces.
     fn condense(&mut self) {
         let columns = self.boundary.columns();
         // Static shapes T, then K_g = Tᵀ K T and M_g = Tᵀ M T.
@@ -224,6 +234,9 @@ impl<'m> Condensation<'m> {
         self.M_g = symmetric_part(&gram(&self.T, &self.model.M.product(&self.T)));
     }
 
+    /// Factorises the small system of the distributing ties; `None` without such ties.
+    ///
+    /// * `rigid`: six rigid motions of the whole mesh as columns, if it is unsupported.
     fn saddle_of(&self, rigid: Option<DMatrix<f64>>) -> Option<Saddle> {
         let means = self.boundary.means();
         if means.is_empty() {
@@ -311,6 +324,8 @@ impl<'m> Condensation<'m> {
         forces
     }
 
+    /// Static shapes T over all DoF, and the forces λ of the distributing ties, one column per
+    /// boundary DoF: `T = B + X` with `K X + Gᵀ λ = -K B` on the free DoF and `G X = 1`.
     fn static_shapes(&self, columns: usize) -> (DMatrix<f64>, DMatrix<f64>) {
         let B = self.boundary.rigid_part();
         let mut X = -self.model.K.product(&B);
@@ -327,19 +342,21 @@ impl<'m> Condensation<'m> {
         (X + B, lambda)
     }
 
+    /// Compliance of the interfaces after the first, which is clamped; empty with one interface.
     fn tip_compliance(&self) -> Result<DMatrix<f64>, ReductionError> {
         let n = self.K_g.nrows();
         if n < 12 {
             return Ok(DMatrix::zeros(0, 0));
         }
-        let K = self.K_g.view((6, 6), (n - 6, n - 6)).into_owned();
-        match free_direction(&K) {
+        let K_BB = self.K_g.view((6, 6), (n - 6, n - 6)).into_owned();
+        match free_direction(&K_BB) {
             Some((interface, direction)) => Err(ReductionError::FreeInterface { interface: interface + 1, direction }),
-            None => spd_inverse(&K).ok_or(ReductionError::Modes(ModesError::NotFinite)),
+            None => spd_inverse(&K_BB).ok_or(ReductionError::Modes(ModesError::NotFinite)),
         }
     }
 
-    /// Compliance of the interfaces after the first, which is clamped; six rows per interface.
+    /// Compliance of the interfaces after the first, which is clamped (m/N, m/(N·m); rad/N,
+    /// rad/(N·m)): six rows and columns per interface, at Io, mesh axes.
     pub fn tip(&self) -> &DMatrix<f64> {
         &self.tip
     }
@@ -349,23 +366,27 @@ impl<'m> Condensation<'m> {
         self.model
     }
 
-    /// Static shapes: displacement of every DoF per unit of each boundary DoF.
+    /// Static shapes T: displacement of every DoF per unit of each boundary DoF, mesh axes; one row
+    /// per DoF of the model, six columns per interface.
     pub fn shapes(&self) -> &DMatrix<f64> {
         &self.T
     }
 
-    /// Guyan stiffness, six rows per interface, mesh axes.
+    /// Guyan stiffness `K_g` (N/m, N/rad; N·m/m, N·m/rad), six rows per interface, at Io, mesh
+    /// axes.
     pub fn stiffness(&self) -> &DMatrix<f64> {
         &self.K_g
     }
 
-    /// Guyan mass, in the same layout.
+    /// Guyan mass `M_g` (kg, kg·m; kg·m, kg·m²), in the same layout.
     pub fn mass(&self) -> &DMatrix<f64> {
         &self.M_g
     }
 
-    /// Displacements of all DoF under unit wrenches at all interfaces except the first, which is
-    /// clamped.
+    /// Displacements of all DoF under unit wrenches on the interfaces after the first, which is
+    /// clamped: `U = T_B C_BB`.
+    ///
+    /// Returns one row per DoF of the model (m, rad; mesh axes) and six columns per interface.
     pub fn unit_load_shapes(&self) -> DMatrix<f64> {
         let n = self.K_g.nrows();
         let T_B = self.T.columns(6, n - 6).into_owned();
@@ -374,7 +395,10 @@ impl<'m> Condensation<'m> {
         U
     }
 
-    /// Replaces nodal forces by the displacements of all DoF, with the first interface clamped.
+    /// Replaces nodal forces by the displacements of all DoF, with the first interface clamped and
+    /// the others free.
+    ///
+    /// * `F`: forces on all DoF (N, N·m; mesh axes), one column per load; on return displacements.
     pub(crate) fn solve_held(&self, F: &mut DMatrix<f64>) {
         for first in (0..F.ncols()).step_by(WIDTH) {
             let mut block = Block::of_columns(F, first, WIDTH.min(F.ncols() - first));
@@ -383,13 +407,23 @@ impl<'m> Condensation<'m> {
         }
     }
 
+    /// As [`Self::solve_held`], for one block.
+    ///
+    /// ```text
+    /// u = K_ii⁻¹ F + T_B u_B,   u_B = C_BB T_Bᵀ F
+    /// ```
     fn solve_held_block(&self, F: &mut Block) {
         let u_B = &self.tip * grams(&self.T_B, F);
         self.solve_constrained(F, None);
         subtract_products(F, &self.T_B, &-u_B);
     }
 
-    /// Displacements of the interfaces after the first under nodal forces, the first one clamped.
+    /// Displacements of the interfaces after the first under nodal forces, the first one clamped:
+    /// `u_B = C_BB T_Bᵀ F`.
+    ///
+    /// * `F`: forces on all DoF (N, N·m; mesh axes), one column per load.
+    ///
+    /// Returns six rows per interface (m, rad; at Io, mesh axes).
     pub fn tip_under(&self, F: &DMatrix<f64>) -> DMatrix<f64> {
         let n = self.K_g.nrows();
         let T_B = self.T.columns(6, n - 6).into_owned();
@@ -398,8 +432,17 @@ impl<'m> Condensation<'m> {
 
     /// Creates the superelement: Guyan reduction if `modes` is empty, Craig-Bampton otherwise.
     ///
+    /// ```text
+    /// K = [ K_g    0        ]      M = [ M_g       Tᵀ M Φ ]      Φ, ω: fixed-interface modes
+    ///     [  0   diag(ω²)   ]          [ Φᵀ M T      1    ]
+    /// ```
     /// * `frames`: name, frame and tie of each interface, in the order of the boundary.
     /// * `modes`: result of [`Self::fixed_modes`].
+    ///
+    /// Returns six coordinates per interface, then one per mode; mesh axes, SI.
+    ///
+    /// # Source
+    /// [Guyan 1965], [Craig & Bampton 1968].
     pub fn superelement(&self, frames: Vec<InterfaceFrame>, modes: &Modes) -> Superelement {
         let (n, m) = (self.K_g.nrows(), modes.len());
         let mut K = DMatrix::zeros(n + m, n + m);
@@ -518,7 +561,8 @@ fn free_direction(K: &DMatrix<f64>) -> Option<(usize, Direction)> {
     Some((most, Direction::new(motion.rows(6 * most, 6).iter().copied())))
 }
 
-/// Inverse of a small SPD matrix with rows of different units, scaled to a unit diagonal first.
+/// Inverse of a small SPD matrix with rows of different units, scaled to a unit diagonal first;
+/// `None` if K is not positive definite.
 pub(crate) fn spd_inverse(K: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = K.diagonal().map(|k| 1.0 / k.sqrt());
     let scaled = DMatrix::from_fn(K.nrows(), K.ncols(), |i, j| K[(i, j)] * scale[i] * scale[j]);

@@ -42,15 +42,17 @@ impl Superelement {
         self.K.nrows() - self.boundary()
     }
 
-    /// Frequencies of the fixed-interface modes, Hz.
+    /// Frequencies of the fixed-interface modes, Hz: roots of the modal diagonal of K.
     pub fn fixed_frequencies_hz(&self) -> Vec<f64> {
         (self.boundary()..self.K.nrows()).map(|k| self.K[(k, k)].max(0.0).sqrt() / std::f64::consts::TAU).collect()
     }
 
-    /// Natural frequencies with the interfaces `held` clamped, ascending, Hz; those of rigid
-    /// motions are near zero.
+    /// Natural frequencies with some interfaces clamped.
     ///
-    /// Empty if the mass is not positive definite.
+    /// * `held`: indices of the clamped interfaces, from 0; none for the free link.
+    ///
+    /// Returns one frequency per remaining coordinate, Hz, ascending; those of rigid motions are
+    /// near zero. Empty if the mass is not positive definite.
     pub fn frequencies_hz(&self, held: &[usize]) -> Vec<f64> {
         let keep: Vec<usize> =
             (0..self.K.nrows()).filter(|k| *k >= self.boundary() || !held.contains(&(k / 6))).collect();
@@ -59,7 +61,7 @@ impl Superelement {
         generalised_frequencies(&K, &M)
     }
 
-    /// Returns the superelement without its modes (Guyan).
+    /// Returns the superelement without its modes: `K_g` and `M_g` of Guyan reduction [Guyan 1965].
     pub fn guyan(&self) -> Self {
         let n = self.boundary();
         let top = |A: &DMatrix<f64>| A.view((0, 0), (n, n)).into_owned();
@@ -67,8 +69,15 @@ impl Superelement {
     }
 }
 
-/// Stiffness of the first two interfaces with all other interfaces and modes free; `None` if one of
-/// those has a singular stiffness.
+/// Stiffness of the first two interfaces with all other interfaces and modes free.
+///
+/// ```text
+/// K12 = K_bb - K_cbᵀ K_cc⁻¹ K_cb      b: the two interfaces,  c: all other coordinates
+/// ```
+/// Returns a 12×12 matrix (N/m, N/rad; N·m/m, N·m/rad), link axes; `None` if `K_cc` is singular.
+///
+/// # Panics
+/// If the superelement has fewer than two interfaces.
 pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
     let n = element.K.nrows();
     let K = &element.K;
@@ -82,7 +91,8 @@ pub fn stiffness12(element: &Superelement) -> Option<Matrix12> {
     Some(Matrix12::from_column_slice(K12.as_slice()))
 }
 
-/// Frequencies of a small dense pencil, Hz, ascending; empty if the mass is not positive definite.
+/// Frequencies `sqrt(λ)/2π` of a small dense pencil `K φ = λ M φ`, SI: Hz, ascending; negative λ
+/// count as zero. Empty if the mass is not positive definite.
 pub(crate) fn generalised_frequencies(K: &DMatrix<f64>, M: &DMatrix<f64>) -> Vec<f64> {
     // Rows have different units, so both matrices are scaled by the mass first.
     let scale = M.diagonal().map(|m| 1.0 / m.sqrt());

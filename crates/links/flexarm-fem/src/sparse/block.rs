@@ -1,8 +1,8 @@
 //! Blocks of up to eight tall columns, the format for right-hand sides, mass products and bases.
 //!
-//! A row is one cache line. An entry of a matrix that is read once serves all eight columns, and their
-//! numbers go through the vector units together. Sums run over the rows in order, the same on every
-//! machine. Not here: products of tall nalgebra matrices (`dense`).
+//! A row is one cache line. An entry of a matrix that is read once serves all eight columns, and
+//! their numbers go through the vector units together. Sums run over the rows in order, the same on
+//! every machine. Not here: products of tall nalgebra matrices (`dense`).
 
 use flexarm_spatial::Real;
 use nalgebra::DMatrix;
@@ -150,6 +150,7 @@ fn small(C: &DMatrix<f64>, first: usize, count: usize) -> Small {
     std::array::from_fn(|i| Row(std::array::from_fn(|j| entry(i, j))))
 }
 
+/// Products `V_kᵀ X` of several blocks with one.
 struct Grams<'a> {
     basis: &'a [Block],
     X: &'a [Row],

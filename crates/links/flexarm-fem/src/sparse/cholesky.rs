@@ -190,6 +190,8 @@ fn smallest_pivot(symbolic: &SymbolicCholesky<u32>, values: &[f64], diagonal: &[
     smallest
 }
 
+/// Symbolic factor in the requested order; minimum degree where nested dissection finds no
+/// separator.
 fn analyse(
     places: SymbolicSparseColMatRef<'_, u32>,
     pattern: &Pattern,

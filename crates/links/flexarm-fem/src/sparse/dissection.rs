@@ -58,8 +58,8 @@ impl Graph {
         i64::from(self.weights[vertex as usize])
     }
 
-    /// Joins each vertex with the free neighbour of its strongest coupling; the number of the coarse
-    /// vertex of each vertex.
+    /// Joins each vertex with the free neighbour of its strongest coupling; the number of the
+    /// coarse vertex of each vertex.
     fn matching(&self) -> (Vec<u32>, usize) {
         let total: u64 = self.weights.iter().map(|w| u64::from(*w)).sum();
         let heaviest = (3 * total / (2 * COARSEST as u64)).max(2) as u32;
@@ -302,7 +302,8 @@ impl<'a> Sides<'a> {
         found.map(|(_, _, to, v)| (v, to))
     }
 
-    /// Moves each vertex at most once, also where the separator grows, and returns to the best state.
+    /// Moves each vertex at most once, also where the separator grows, and returns to the best
+    /// state.
     fn pass(&mut self) -> bool {
         let separator: Vec<u32> = (0..self.side.len() as u32).filter(|v| self.side[*v as usize] == SEPARATOR).collect();
         let patience = (5 * separator.len()).min(100);

@@ -137,7 +137,7 @@ pub(crate) fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Re
     let limit = pencil.dimension.min(8 * count + 120);
     let (ritz, found) = loop {
         basis.advance(pencil, None)?;
-        if basis.is_to_be_looked_at(count, limit) {
+        if basis.is_solve_due(count, limit) {
             let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;
             match ritz.settled(wanted, count, &basis)? {
                 Some(found) => break (ritz, found),
@@ -153,7 +153,7 @@ pub(crate) fn smallest_modes(pencil: &mut Pencil<'_>, wanted: ModesWanted) -> Re
 /// from one basis.
 ///
 /// ```text
-/// K_r⁻¹ = K⁻¹ + T C Tᵀ                                T: static shapes of the released support, C = (Tᵀ K T)⁻¹
+/// K_r⁻¹ = K⁻¹ + T C Tᵀ,   C = (Tᵀ K T)⁻¹      T: static shapes of the released support
 /// K_r⁻¹ M [V T] = [V T] P + V_{j+1} R_{j+1} s_last    where V begins with K⁻¹ M T
 /// ```
 /// The basis of the first pencil, extended by T, is a Lanczos basis of the second.
@@ -177,7 +177,7 @@ pub(crate) fn modes_of_two_supports(
     let limit = dimension.min(8 * most + 120);
     loop {
         basis.advance(pencil, Some(released.T))?;
-        if !basis.is_to_be_looked_at(most, limit) {
+        if !basis.is_solve_due(most, limit) {
             continue;
         }
         let ritz = basis.ritz().ok_or(ModesError::NotFinite)?;

@@ -2,9 +2,9 @@
 //! uses faer.
 //!
 //! ```text
-//! SparseSymmetric --(Ordering)--> Cholesky --solve--> K⁻¹ F        eight right-hand sides at a time
+//! SparseSymmetric --(Ordering)--> Cholesky --solve--> K⁻¹ F     eight right-hand sides at a time
 //!                                     |
-//!                                 smallest_modes: shift-invert block Lanczos on any operator (K, M)
+//!                                 smallest_modes: shift-invert block Lanczos on any (K, M)
 //! ```
 //! Only the lower triangle is stored, by columns. Tall results are nalgebra matrices, one column
 //! per right-hand side; operations on a factor, matrix or basis take them as `Block`s, row by

@@ -212,6 +212,7 @@ impl Work for BlockProduct<'_> {
 
     #[inline(always)]
     fn run<T: Real, const P: usize>(self) {
+        // Entry (i, j) of the lower triangle serves rows i and j.
         for j in 0..self.A.size() {
             let entries = self.A.pattern.column(j);
             let (mut sum, x_j) = (Wide::<T, P>::zero(), Wide::<T, P>::load(&self.X[j]));

@@ -5,13 +5,13 @@
 //! that each whole part has its own mass, centre of mass and inertia.
 //!
 //! ```text
-//! F(x) = X(x) w_B + Σ F_part(beyond x),     σ(x, y, z) from F(x)
+//! F(x) = Ad_BXᵀ F_B + Σ F_part(beyond x),     σ(x, y, z) from F(x)      X: the section at x
 //! ```
 //! The places are points on the outline of the section at planes along the beam. What the section
 //! forces do not contain is not there: stress concentration at joints, warping, local bending.
 //!
-//! Start at [`BeamLink::stress_fields`]. x along the beam from E, m; wrenches in link axes. Not here: the
-//! outline (`section_outline`), meshes (`fields`).
+//! Start at [`BeamLink::stress_fields`]. x along the beam from E, m; wrenches in link axes. Not
+//! here: the outline (`section_outline`), meshes (`fields`).
 
 use nalgebra::{DMatrix, Matrix3, Point3, Vector3, Vector6};
 
@@ -39,7 +39,9 @@ impl BeamLink {
     /// Returns the stress at points on the outline of the section, at planes along the beam.
     ///
     /// * `joints`, `parts`: of the lumped model whose motion causes the stress, proximal first, one
-    ///   more part than joints.
+    ///   more part than joints; link axes.
+    ///
+    /// Returns the stress (Pa per unit load) in link axes, and the section forces in beam axes.
     ///
     /// # Errors
     /// As [`BeamLink::reduce`]; [`FemError::Missing`] for a section that is given by its stiffness,
@@ -51,9 +53,9 @@ impl BeamLink {
         positive("advance of the beam from A to B (m)", advance)?;
         let outline = self.section.outline(self.material.nu)?;
         let own = self.section.properties(self.material.nu)?;
-        let R = *self.X_LE.rotation.matrix();
+        let R_LE = *self.X_LE.rotation.matrix();
         let K_BB = self.tip_stiffness()?;
-        let compliance = K_BB.try_inverse().ok_or(FemError::Missing {
+        let C_BB = K_BB.try_inverse().ok_or(FemError::Missing {
             what: "the compliance of the beam",
             help: "its stiffness is singular in rounding: check its dimensions",
         })?;
@@ -66,7 +68,7 @@ impl BeamLink {
         let x: Vec<f64> = (0..=PIECES).map(|plane| self.length * plane as f64 / PIECES as f64).collect();
         let mut forces = DMatrix::zeros(6 * x.len(), columns);
         for (plane, &x) in x.iter().enumerate() {
-            let section: Vec<Vector6<f64>> = self.section_forces(x, &spread).iter().map(|F| turned(&R, F)).collect();
+            let section: Vec<Vector6<f64>> = self.section_forces(x, &spread).iter().map(|F| turned(&R_LE, F)).collect();
             for (j, F) in section.iter().enumerate() {
                 forces.fixed_view_mut::<6, 1>(6 * plane, j).copy_from(&F.cast::<f32>());
             }
@@ -79,12 +81,14 @@ impl BeamLink {
                     material: 0,
                     from_tie: f64::INFINITY,
                 });
-                // σ = R [σ_x τ; τ 0] Rᵀ: normal stress along x, shear stress along the outline.
+                // σ_L = R_LE [σ_x τ; τ 0] R_LEᵀ: normal stress along x, shear stress along the
+                // outline.
                 for (j, F) in section.iter().enumerate() {
                     let [normal, shear] = stress_at(point, [own.A, own.I_y, own.I_z], F);
                     let [t_y, t_z] = point.tangent.map(|t| shear * t);
-                    let S = R * Matrix3::new(normal, t_y, t_z, t_y, 0.0, 0.0, t_z, 0.0, 0.0) * R.transpose();
-                    let six = [S[(0, 0)], S[(1, 1)], S[(2, 2)], S[(0, 1)], S[(1, 2)], S[(2, 0)]];
+                    let sigma_E = Matrix3::new(normal, t_y, t_z, t_y, 0.0, 0.0, t_z, 0.0, 0.0);
+                    let s = R_LE * sigma_E * R_LE.transpose();
+                    let six = [s[(0, 0)], s[(1, 1)], s[(2, 2)], s[(0, 1)], s[(1, 2)], s[(2, 0)]];
                     (0..6).for_each(|c| stress[(first + c, j)] = six[c] as f32);
                 }
             }
@@ -93,7 +97,7 @@ impl BeamLink {
             link: self.name.clone(),
             interfaces: vec!["A".into(), "B".into()],
             poses: vec![self.X_LA, self.X_LB],
-            compliance: DMatrix::from_column_slice(6, 6, compliance.as_slice()),
+            compliance: DMatrix::from_column_slice(6, 6, C_BB.as_slice()),
             frequencies_hz: Vec::new(),
             materials: vec![self.material],
             triangles: surface(&sites, count),
@@ -117,25 +121,27 @@ impl BeamLink {
         parts.iter().zip(ends.windows(2)).map(spread).collect()
     }
 
-    /// Section forces at x along the beam: force and moment about the axis of the beam there, in link
-    /// axes, on the side of A; one column per wrench component at B and inertia load.
+    /// Section forces at x along the beam: force and moment about the axis of the beam there, in
+    /// link axes, on the side of A; one column per wrench component at B and inertia load.
     fn section_forces(&self, x: f64, parts: &[SpreadPart<'_>]) -> Vec<Vector6<f64>> {
-        let about = (self.X_LE * Point3::new(x, 0.0, 0.0)).coords;
+        // X: the section at x, with its origin on the axis of the beam.
+        let p_LX = (self.X_LE * Point3::new(x, 0.0, 0.0)).coords;
         let axis = self.X_LE.rotation.matrix().column(0).into_owned();
-        let r = self.X_LB.translation.vector - about;
+        let p_XB = self.X_LB.translation.vector - p_LX;
         let of_wrench = (0..6).map(|c| {
             let unit = Vector6::ith(c, 1.0);
-            let moment = unit.fixed_rows::<3>(3) + r.cross(&unit.fixed_rows::<3>(0));
+            let moment = unit.fixed_rows::<3>(3) + p_XB.cross(&unit.fixed_rows::<3>(0));
             joined(&unit.fixed_rows::<3>(0).into_owned(), &moment)
         });
         let beyond: Vec<RigidPart> = parts.iter().filter_map(|part| part.beyond(x, &axis)).collect();
-        let of_inertia = (0..INERTIA_LOADS).map(|j| beyond.iter().map(|part| part_load(part, j, &about)).sum());
+        let of_inertia = (0..INERTIA_LOADS).map(|j| beyond.iter().map(|part| part_load(part, j, &p_LX)).sum());
         of_wrench.chain(of_inertia).collect()
     }
 }
 
 impl SpreadPart<'_> {
-    /// Returns what is beyond a plane at x along the beam; `axis`: direction of the beam, link axes.
+    /// Returns what is beyond a plane at x along the beam; `axis`: direction of the beam, link
+    /// axes.
     fn beyond(&self, x: f64, axis: &Vector3<f64>) -> Option<RigidPart> {
         let Self { part, length, start } = self;
         let end = start + length;
@@ -155,9 +161,13 @@ impl SpreadPart<'_> {
     }
 }
 
-/// Normal and shear stress (Pa) at a point of the outline under the section force F, beam axes.
+/// Normal stress along x and shear stress along the outline (Pa) at a point of it.
 ///
-/// * `A`, `I_y`, `I_z`: area and second moments of the section.
+/// ```text
+/// σ = N/A + M_y z/I_y - M_z y/I_z,   τ = T torsion + V_y shear_y + V_z shear_z
+/// ```
+/// * `A`, `I_y`, `I_z`: area (m²) and second moments (m⁴) of the section.
+/// * `F`: section force `[N V_y V_z T M_y M_z]` on its axis, beam axes.
 fn stress_at(point: &OutlinePoint, [A, I_y, I_z]: [f64; 3], F: &Vector6<f64>) -> [f64; 2] {
     let normal = F[0] / A + F[4] * point.z / I_y - F[5] * point.y / I_z;
     [normal, F[3] * point.torsion + F[1] * point.shear_y + F[2] * point.shear_z]
@@ -175,11 +185,12 @@ fn surface(sites: &[StressSite], count: usize) -> Vec<[u32; 3]> {
     triangles.flatten().collect()
 }
 
+/// Wrench `[f; t]`.
 fn joined(force: &Vector3<f64>, moment: &Vector3<f64>) -> Vector6<f64> {
     Vector6::new(force.x, force.y, force.z, moment.x, moment.y, moment.z)
 }
 
-/// Returns a wrench in beam axes.
+/// Returns a wrench, given in link axes, in beam axes at the same point.
 fn turned(R_LE: &Matrix3<f64>, F: &Vector6<f64>) -> Vector6<f64> {
     joined(&(R_LE.transpose() * F.fixed_rows::<3>(0)), &(R_LE.transpose() * F.fixed_rows::<3>(3)))
 }

@@ -37,7 +37,11 @@ struct About {
     interfaces: Vec<String>,
 }
 
-/// Returns the content of a stress file.
+/// Returns the content of a stress file; equal fields give equal bytes. The section forces of a
+/// beam are not written.
+///
+/// # Panics
+/// If the sizes of the fields do not agree with each other.
 pub fn write_stress(fields: &StressFields) -> Vec<u8> {
     let sites = fields.sites.len();
     let bytes = |numbers: &mut dyn Iterator<Item = f64>| numbers.flat_map(f64::to_le_bytes).collect::<Vec<u8>>();
@@ -91,9 +95,15 @@ pub fn write_stress(fields: &StressFields) -> Vec<u8> {
 
 /// Reads a stress file.
 ///
+/// * `bytes`: the whole file.
+///
+/// Returns the fields, with every size, index and number checked; no section forces.
+///
 /// # Errors
-/// [`StressError`].
+/// [`StressError`] for bytes that are no stress file, and for a tensor that is missing, has another
+/// shape or type, or contains an impossible number.
 pub fn parse_stress(bytes: &[u8]) -> Result<StressFields, StressError> {
+    // Description, then tensors: the sizes of the later ones follow from the earlier ones.
     let about = read_about(bytes)?;
     let file = SafeTensors::deserialize(bytes).map_err(|e| StressError::file(format!("damaged: {e}")))?;
     let file = Tensors { file: &file };
@@ -170,6 +180,7 @@ impl<'a> Tensors<'a> {
         Ok(tensor.data().as_chunks().0.iter().map(|word| f64::from_le_bytes(*word)).collect())
     }
 
+    /// Rows of a matrix of numbers with the given width.
     fn rows(&self, name: &'static str, width: usize) -> Result<Vec<Vec<f64>>, StressError> {
         let tensor = self.tensor(name, Dtype::F64)?;
         if tensor.shape().len() != 2 || tensor.shape()[1] != width {
@@ -190,6 +201,7 @@ impl<'a> Tensors<'a> {
         Ok(tensor.data().as_chunks().0.iter().map(|word| u64::from(u32::from_le_bytes(*word))).collect())
     }
 
+    /// Sites, with their materials checked against the number of materials.
     fn sites(&self, materials: usize) -> Result<Vec<StressSite>, StressError> {
         let positions = self.rows("position", 3)?;
         let (nodes, kinds, tied) = (self.whole("node")?, self.whole("material")?, self.numbers("from_tie")?);

@@ -39,8 +39,8 @@ impl StressFields {
         Ok(site as usize)
     }
 
-    /// Returns the outward normal of the surface at a site: mean of its triangles with the weights of
-    /// Max (1999), *J. Graphics Tools* 4(2), which are exact on a sphere.
+    /// Returns the outward normal of the surface at a site: mean of its triangles with the weights
+    /// of Max (1999), *J. Graphics Tools* 4(2), which are exact on a sphere.
     pub fn normal(&self, site: usize) -> Vector3<f64> {
         let edge = |k: u32| self.sites[k as usize].position - self.sites[site].position;
         let weighted = self.triangles.iter().filter_map(|corners| {

@@ -3,9 +3,9 @@
 //! ```text
 //! σ = S_w w + S_m η_m + Σ a_j (S_a,j - S_w w_j - S_m η_j),     [w; η_m] = A q
 //! ```
-//! w is the wrench at the interfaces that the deflection q of the model stands for, `w_j`, `η_j` the
-//! model's own static response to the inertia load j. So the stress is that of the mesh under every
-//! static load, whatever the model of the link, and the deflection adds its dynamics.
+//! w is the wrench at the interfaces that the deflection q of the model stands for, `w_j`, `η_j`
+//! the model's own static response to the inertia load j. So the stress is that of the mesh under
+//! every static load, whatever the model of the link, and the deflection adds its dynamics.
 
 use nalgebra::{DMatrix, DVector, Matrix6, Vector3, Vector6};
 
@@ -29,10 +29,10 @@ pub struct StressMap {
     section_forces: DMatrix<f32>,
 }
 
-/// Returns the inertia loads of a link.
+/// Returns the inertia loads of a link, in the order of [`INERTIA_LOADS`].
 ///
 /// * `a`: acceleration of Lo minus gravity (m/s²); `alpha`, `omega`: angular acceleration and
-///   velocity (rad/s², rad/s); all in link axes.
+///   velocity (rad/s², rad/s) of the link frame in the world; all in link axes.
 pub fn inertia_loads(a: &Vector3<f64>, alpha: &Vector3<f64>, omega: &Vector3<f64>) -> [f64; INERTIA_LOADS] {
     let w = omega;
     [a.x, a.y, a.z, alpha.x, alpha.y, alpha.z, w.x * w.x, w.y * w.y, w.z * w.z, w.x * w.y, w.x * w.z, w.y * w.z]
@@ -55,7 +55,11 @@ impl StressMap {
         &self.section_forces
     }
 
-    /// Appends the amplitudes and inertia loads at coordinates q.
+    /// Appends the factors of the columns of [`Self::stress`] at one state: amplitudes `A q`, then
+    /// the inertia loads.
+    ///
+    /// * `q`: coordinates of the model of the link (m, rad, or modal).
+    /// * `loads`: result of [`inertia_loads`].
     pub fn append(&self, q: &[f64], loads: &[f64; INERTIA_LOADS], to: &mut Vec<f32>) {
         for row in self.A.row_iter() {
             to.push(row.iter().zip(q).map(|(a, q)| a * q).sum::<f64>() as f32);
@@ -69,6 +73,8 @@ impl StressFields {
     ///
     /// * `factor`: factor on its stiffness.
     ///
+    /// Returns the map from the link's coordinates to stress in link axes, Pa.
+    ///
     /// # Errors
     /// [`StressError`] if the link is another one, or has other coordinates.
     pub fn modal_map(&self, link: &ModalLink, factor: f64) -> Result<StressMap, StressError> {
@@ -81,11 +87,13 @@ impl StressFields {
                  coordinates of the modal link: leave out eigenmodes, or {REDUCE_AGAIN}"
             )));
         }
+        // Wrenches on the interfaces are stiffness times displacement; modes are themselves.
         let n = link.coordinates();
         let K_cc = link.K.view((0, 0), (wrenches, wrenches)).into_owned();
         self.check(&K_cc)?;
         let mut A = DMatrix::identity(n, n);
         A.view_mut((0, 0), (wrenches, wrenches)).copy_from(&(K_cc * factor));
+        // w_j, η_j: static response of the model to each inertia load.
         let K = (&link.K * factor)
             .cholesky()
             .ok_or_else(|| StressError("the stiffness of the modal link is not positive definite".into()))?;
@@ -99,7 +107,11 @@ impl StressFields {
     /// Returns the map for a chain of rigid parts and elastic joints.
     ///
     /// * `joints`, `parts`: proximal first, one more part than joints, without attached bodies.
-    /// * `springs`: stiffness of the joints in use, which may differ from that of the source.
+    /// * `springs`: stiffness `K_S` of the joints in use, S axes; may differ from that of the
+    ///   source.
+    ///
+    /// Returns the map from the displacements of the joints, six per joint in its axes, to stress
+    /// in link axes, Pa.
     ///
     /// # Errors
     /// [`StressError`] if the link is another one.
@@ -112,22 +124,24 @@ impl StressFields {
         // Displacement of B per displacement d_S of each joint, r from S to B in L:
         //   u_B = X d_S,    X = [R_LS, -[r]x R_LS; 0, R_LS]
         let p_LB = self.poses[1].translation.vector;
-        let displacement = |joint: &ElasticSplit| {
-            let (R, r) = (joint.X_LS.rotation.matrix(), p_LB - joint.X_LS.translation.vector);
-            let mut X = Matrix6::zeros();
-            X.fixed_view_mut::<3, 3>(0, 0).copy_from(R);
-            X.fixed_view_mut::<3, 3>(3, 3).copy_from(R);
-            X.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-r.cross_matrix() * R));
-            X
+        // Ad_BS: displacement of B, link axes, per displacement of each joint, S axes.
+        let carry = |joint: &ElasticSplit| {
+            let (R_LS, p_SB) = (joint.X_LS.rotation.matrix(), p_LB - joint.X_LS.translation.vector);
+            let mut Ad_BS = Matrix6::zeros();
+            Ad_BS.fixed_view_mut::<3, 3>(0, 0).copy_from(R_LS);
+            Ad_BS.fixed_view_mut::<3, 3>(3, 3).copy_from(R_LS);
+            Ad_BS.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-p_SB.cross_matrix() * R_LS));
+            Ad_BS
         };
         let X: Vec<Matrix6<f64>> = joints.iter().map(displacement).collect();
         // Compliances C of the joints, and the stiffness of B, K_B = (Σ X C Xᵀ)⁻¹.
         let singular = || StressError("the stiffness of a joint is singular".into());
         let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or_else(singular);
+        // Compliances C_S, and K_BB = (Σ Ad_BS C_S Ad_BSᵀ)⁻¹.
         let at_B = |springs: &mut dyn Iterator<Item = &Matrix6<f64>>| {
             let C: Vec<Matrix6<f64>> = springs.map(inverse).collect::<Result<_, _>>()?;
-            let at_B: Matrix6<f64> = X.iter().zip(&C).map(|(X, C)| X * C * X.transpose()).sum();
-            Ok::<_, StressError>((C, inverse(&at_B)?))
+            let C_BB: Matrix6<f64> = Ad.iter().zip(&C).map(|(Ad_BS, C_S)| Ad_BS * C_S * Ad_BS.transpose()).sum();
+            Ok::<_, StressError>((C, inverse(&C_BB)?))
         };
         // The nominal joints must give the stiffness of the link of these fields.
         let (_, nominal) = at_B(&mut joints.iter().map(|joint| &joint.K_S))?;
@@ -135,21 +149,21 @@ impl StressFields {
         let (C, K_B) = at_B(&mut springs.iter())?;
         // Wrench at B per joint displacement: F_B = K_B X d_S.
         let mut A = DMatrix::zeros(6, 6 * joints.len());
-        for (k, X) in X.iter().enumerate() {
-            A.fixed_view_mut::<6, 6>(0, 6 * k).copy_from(&(K_B * X));
+        for (k, Ad_BS) in Ad.iter().enumerate() {
+            A.fixed_view_mut::<6, 6>(0, 6 * k).copy_from(&(K_BB * Ad_BS));
         }
         // Part of F_B that is due to the deflection under the inertia loads alone, d_S = C F_S with the
         // loads of all parts beyond the joint.
         let own = (0..INERTIA_LOADS).map(|j| {
             let mut q = DVector::zeros(6 * joints.len());
             for (k, joint) in joints.iter().enumerate() {
-                let F = parts[k + 1..].iter().map(|part| part_load(part, j, &joint.X_LS.translation.vector)).sum();
-                let Rt = joint.X_LS.rotation.matrix().transpose();
-                let F: Vector6<f64> = F;
-                let mut turned = Vector6::zeros();
-                turned.fixed_rows_mut::<3>(0).copy_from(&(Rt * F.fixed_rows::<3>(0)));
-                turned.fixed_rows_mut::<3>(3).copy_from(&(Rt * F.fixed_rows::<3>(3)));
-                q.fixed_rows_mut::<6>(6 * k).copy_from(&(C[k] * turned));
+                let p_LS = joint.X_LS.translation.vector;
+                let F_L: Vector6<f64> = parts[k + 1..].iter().map(|part| part_load(part, j, &p_LS)).sum();
+                let R_SL = joint.X_LS.rotation.matrix().transpose();
+                let mut F_S = Vector6::zeros();
+                F_S.fixed_rows_mut::<3>(0).copy_from(&(R_SL * F_L.fixed_rows::<3>(0)));
+                F_S.fixed_rows_mut::<3>(3).copy_from(&(R_SL * F_L.fixed_rows::<3>(3)));
+                q.fixed_rows_mut::<6>(6 * k).copy_from(&(C[k] * F_S));
             }
             &A * q
         });
@@ -157,6 +171,8 @@ impl StressFields {
         Ok(self.map(A, &[0, 1, 2, 3, 4, 5], &[1.0; 6], &own))
     }
 
+    /// Maps the stored fields to amplitudes and residual inertia loads; see the module.
+    ///
     /// * `columns`: field of each amplitude, with its factor; `own`: amplitudes of the model under
     ///   each inertia load.
     fn map(&self, A: DMatrix<f64>, columns: &[usize], factors: &[f64], own: &[DVector<f64>]) -> StressMap {
@@ -167,6 +183,7 @@ impl StressFields {
             for (k, (column, factor)) in columns.iter().zip(factors).enumerate() {
                 mapped.set_column(k, &(fields.column(*column) * *factor as f32));
             }
+            // S_a,j - Σ_k own_k S_k, in f64: the difference of two large fields.
             let mut residual = vec![0.0_f64; rows];
             for (j, own) in own.iter().enumerate() {
                 let of_mesh = fields.column(wrenches + j);
@@ -189,7 +206,8 @@ impl StressFields {
         }
     }
 
-    /// Compares the stiffness of interfaces with that of the fields.
+    /// Checks that the stiffness K of the interfaces, A clamped, is the inverse of the stored
+    /// compliance.
     fn check(&self, K: &DMatrix<f64>) -> Result<(), StressError> {
         let n = K.nrows();
         let product = self.compliance.view((0, 0), (n, n)) * K;
@@ -208,23 +226,30 @@ impl StressFields {
     }
 }
 
-/// Generalised force of inertia load j on a modal link.
+/// Generalised forces `-∫ φ_k·(A s + b) dm` of inertia load j on the coordinates of a modal link.
 fn modal_force(link: &ModalLink, j: usize) -> DVector<f64> {
     let field = Field::unit(j);
     DVector::from_iterator(
         link.coordinates(),
         (0..link.coordinates()).map(|k| {
-            // ∫ φ·(A s + b) dm, with P[a, b] = ∫ s_a φ_b dm
+            // P_k[a, b] = ∫ s_a φ_b dm, so ∫ φ·A s dm = tr(A P_k).
             -(link.C_t.column(k).dot(&field.b) + (field.A * link.P[k]).trace())
         }),
     )
 }
 
-/// Wrench of inertia load j on a rigid part about a point, link axes.
-pub(super) fn part_load(part: &RigidPart, j: usize, about: &Vector3<f64>) -> Vector6<f64> {
+/// Wrench of inertia load j on a rigid part.
+///
+/// ```text
+/// f = -m (A c + b),   t = (c - p) × f - ∫ r × (A r) dm      r from the centre of mass c
+/// ```
+/// * `p_L`: point about which the moment is, link axes, m.
+///
+/// Returns `[f; t]` per unit load, link axes.
+pub(super) fn part_load(part: &RigidPart, j: usize, p_L: &Vector3<f64>) -> Vector6<f64> {
     let field = Field::unit(j);
     let D = nalgebra::Matrix3::identity() * (0.5 * part.inertia.trace()) - part.inertia;
     let force = -(field.A * part.com + field.b) * part.mass;
-    let torque = (part.com - about).cross(&force) - axial(&(D * field.A.transpose()));
+    let torque = (part.com - p_L).cross(&force) - axial(&(D * field.A.transpose()));
     Vector6::new(force.x, force.y, force.z, torque.x, torque.y, torque.z)
 }

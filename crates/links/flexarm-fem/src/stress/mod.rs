@@ -5,7 +5,7 @@
 //!
 //! ```text
 //! σ = λ tr(ε) 1 + 2 μ ε,   ε = (∇u + ∇uᵀ)/2     at the integration points
-//! σ_corner = pinv(N_corner(ξ_p)) σ_p            in each element; mid-side nodes: mean of their corners
+//! σ_corner = pinv(N_corner(ξ_p)) σ_p            in each element; mid-side nodes: mean of corners
 //! σ_node = mean over the elements of one material at the node
 //! ```
 //! Stresses at the integration points converge faster than at nodes, so they are extrapolated to
@@ -15,8 +15,8 @@
 //! A link that is one beam gets its stress from its section forces
 //! ([`crate::BeamLink::stress_fields`]).
 //!
-//! Not here: beam elements of a mesh; ties, near which the stress of a rigid interface is not that of
-//! the part.
+//! Not here: beam elements of a mesh; ties, near which the stress of a rigid interface is not that
+//! of the part.
 //!
 //! Source: Hinton & Campbell (1974), *Int. J. Numer. Meth. Eng.* 8; Barlow (1976), *Int. J. Numer.
 //! Meth. Eng.* 10.

@@ -52,16 +52,24 @@ pub struct StressRecovery<'a> {
     pub quadrature: Quadrature,
 }
 
-/// Returns the von Mises stress of `xx yy zz xy yz zx`.
+/// Returns the von Mises stress, in the unit of the components; it does not depend on the axes.
+///
+/// ```text
+/// σ_v² = ½ ((σ_xx - σ_yy)² + (σ_yy - σ_zz)² + (σ_zz - σ_xx)²) + 3 (σ_xy² + σ_yz² + σ_zx²)
+/// ```
 pub fn von_mises([xx, yy, zz, xy, yz, zx]: [f64; 6]) -> f64 {
     let normal = (xx - yy).powi(2) + (yy - zz).powi(2) + (zz - xx).powi(2);
     (0.5 * normal + 3.0 * (xy * xy + yz * yz + zx * zx)).sqrt()
 }
 
 impl StressRecovery<'_> {
-    /// Calls `visit` with the stress at every integration point of the solid elements.
+    /// Calls `visit` with the stress at every integration point of the solid elements, Pa, mesh
+    /// axes.
     ///
     /// * `U`: displacements of all DoF, m; one column per load.
+    ///
+    /// # Panics
+    /// If `U` has fewer rows than the model has DoF.
     pub fn for_each_point(&self, U: &DMatrix<f64>, mut visit: impl FnMut(StressPoint<'_>)) {
         let mut element = ElementStress::new(U.ncols());
         for (b, block) in self.solid_blocks() {
@@ -76,10 +84,14 @@ impl StressRecovery<'_> {
         }
     }
 
-    /// Returns the stress at nodes, `columns` entries for the first place, then for the second, ...
+    /// Returns the stress at nodes, Pa, mesh axes: one entry per column of `U` for the first place,
+    /// then for the second, ...
     ///
     /// * `U`: displacements of all DoF, m; one column per load.
     /// * `places`: sorted, as [`Self::places`] returns them.
+    ///
+    /// # Panics
+    /// If `U` has fewer rows than the model has DoF.
     pub fn at_nodes(&self, U: &DMatrix<f64>, places: &[NodalPlace]) -> Vec<[f64; 6]> {
         let columns = U.ncols();
         let mut sums = vec![[0.0; 6]; places.len() * columns];
@@ -123,7 +135,12 @@ impl StressRecovery<'_> {
         sums
     }
 
-    /// Returns the places of nodes: one per node and material that its elements have, sorted.
+    /// Returns the places of nodes: one per node and material that its solid elements have, sorted.
+    ///
+    /// * `nodes`: indices into the nodes of the mesh, in any order.
+    ///
+    /// # Panics
+    /// For an index that is not in the mesh.
     pub fn places(&self, nodes: &[u32]) -> Vec<NodalPlace> {
         let mut wanted = vec![false; self.mesh.nodes.len()];
         nodes.iter().for_each(|node| wanted[*node as usize] = true);
@@ -188,13 +205,17 @@ impl ElementStress {
         Self { workspace, x: vec![], u: vec![], points: vec![], stress: vec![], columns }
     }
 
+    /// Computes points and stress of one element.
+    ///
+    /// * `U`: displacements of all DoF, mesh axes, one column per load.
     fn compute(&mut self, source: &StressRecovery<'_>, block: &ElementBlock, nodes: &[u32], U: &DMatrix<f64>) {
         let material = &source.materials[block.region];
         let rule = source.rule();
         let with_modes = block.kind == ElementKind::Hex8 && rule == Quadrature::CalculixModes;
         self.x.clear();
         self.x.extend(nodes.iter().map(|node| source.mesh.nodes[*node as usize]));
-        // Inverted elements were rejected when the model was assembled.
+        // Amplitudes of the incompatible modes per nodal displacement. Inverted elements were
+        // rejected when the model was assembled.
         let amplitudes = if with_modes { self.workspace.mode_amplitudes(&self.x, material, rule).ok() } else { None };
         self.u.clear();
         for j in 0..self.columns {
@@ -223,6 +244,7 @@ impl ElementStress {
                 gradients.extend(mode_gradients_at(x, point.xi));
             }
             for u in u.chunks_exact(stride.max(1)) {
+                // H = ∇u, then Hooke's law.
                 let H = u.iter().zip(&gradients).fold(Matrix3::zeros(), |sum, (u, d)| sum + u * d.transpose());
                 let [xx, yy, zz] = [0, 1, 2].map(|a| 2.0 * mu * H[(a, a)] + lambda * H.trace());
                 let shear = |a: usize, b: usize| mu * (H[(a, b)] + H[(b, a)]);
@@ -242,6 +264,7 @@ struct Extrapolation {
 }
 
 impl Extrapolation {
+    /// Pseudo-inverse of the corners' shape functions at the points of Calculix's rule.
     fn of(kind: ElementKind) -> Self {
         let corner_kind = match kind {
             ElementKind::Tet10 => ElementKind::Tet4,
@@ -260,8 +283,8 @@ impl Extrapolation {
         });
         debug_assert!(visited.is_ok(), "the reference element is inverted");
         let at_points = DMatrix::from_row_slice(rows.len() / n, n, &rows);
-        // Solution of minimum norm where points are fewer than corners (constant in TET4, along the axis of
-        // WEDGE6); it exists for every matrix.
+        // Solution of minimum norm where points are fewer than corners (constant in TET4, along the
+        // axis of WEDGE6); it exists for every matrix.
         let corners = at_points.pseudo_inverse(1e-10).unwrap_or_else(|_| DMatrix::zeros(n, rows.len() / n));
         let midsides = if kind.nodes() > n { edges(kind) } else { &[] };
         Self { corners, midsides }

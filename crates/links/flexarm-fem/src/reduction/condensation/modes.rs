@@ -14,10 +14,19 @@ use crate::sparse::{
 const ROUGH: f64 = 1e-6;
 
 impl Condensation<'_> {
-    /// Modes with every interface clamped (Craig-Bampton).
+    /// Modes with every interface clamped.
+    ///
+    /// ```text
+    /// K_ii φ = ω² M_ii φ,   G φ = 0
+    /// ```
+    /// Returns ω² ascending and mass-normalised shapes over all DoF, mesh axes; one sparse solve
+    /// per Lanczos vector.
     ///
     /// # Errors
     /// [`ModesError`].
+    ///
+    /// # Source
+    /// [Craig & Bampton 1968].
     pub fn fixed_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
         let solve = &mut |F: &mut Block| {
             self.solve_constrained(F, None);
@@ -26,7 +35,7 @@ impl Condensation<'_> {
         smallest_modes(&mut self.pencil(0, solve, mass), wanted)
     }
 
-    /// Modes with the first interface clamped and the others free.
+    /// Modes with the first interface clamped and the others free, as in [`Self::fixed_modes`].
     ///
     /// # Errors
     /// [`ModesError`].
@@ -104,18 +113,20 @@ impl Condensation<'_> {
         self.boundary.free().len() - self.boundary.means().len()
     }
 
-    /// Elastic modes of the free link.
+    /// Elastic modes of the free link, without the six rigid motions; as in [`Self::fixed_modes`].
     ///
     /// # Errors
     /// [`ModesError`].
     pub fn free_modes(&self, wanted: ModesWanted) -> Result<Modes, ModesError> {
-        // u <- u - R (Rᵀ M R)⁻¹ Rᵀ M u removes the rigid motion (zero momentum).
+        // R: rigid motions of the mesh, from those of the boundary.
         let n = self.T.ncols();
         let R_b = DMatrix::from_fn(n, 6, |i, j| if i < 6 { f64::from(i == j) } else { self.rigid_at(i, j) });
         let mut R = DMatrix::zeros(self.T.nrows(), 6);
         add_product(&mut R, 1.0, &self.T, &R_b);
         let (R, MR) = (Block::of_columns(&R, 0, 6), Block::of_columns(&self.model.M.product(&R), 0, 6));
         let Some(inverse) = R.gram(&MR).try_inverse() else { return Err(ModesError::NotFinite) };
+        // Loads without resultant, and displacements without momentum:
+        // F <- F - M R (Rᵀ M R)⁻¹ Rᵀ F,   u <- u - R (Rᵀ M R)⁻¹ Rᵀ M u.
         let solve = &mut |F: &mut Block| {
             F.subtract_product(&MR, &(&inverse * R.gram(F)));
             self.solve_held_block(F);
@@ -136,8 +147,12 @@ impl Condensation<'_> {
         -(self.tip.row(i - 6) * K_BA)[(0, 0)]
     }
 
-    /// Residual `‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖` of each mode on the mesh, over the free DoF; for
-    /// modes under any support.
+    /// Residual of each mode on the mesh, over the free DoF; for modes under any support.
+    ///
+    /// ```text
+    /// ‖K φ - ω² M φ + Gᵀ λ‖ / ‖ω² M φ‖      λ: least squares
+    /// ```
+    /// * `modes`: shapes over all DoF, as the functions above return them.
     pub fn mode_residuals(&self, modes: &Modes) -> Vec<f64> {
         let K = self.model.K.product(&modes.shapes);
         let M = self.model.M.product(&modes.shapes);

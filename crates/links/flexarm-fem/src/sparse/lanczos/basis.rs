@@ -36,7 +36,8 @@ pub(super) struct Basis {
     /// Dimension of the space.
     dimension: usize,
     solves: usize,
-    next_look: usize,
+    /// Size of the basis from which the projected operator is solved again.
+    next_solve: usize,
 }
 
 /// Products of T, the shapes of a released support, with the basis.
@@ -87,7 +88,7 @@ impl Basis {
             beside: None,
             dimension: pencil.dimension,
             solves: W.width,
-            next_look: 0,
+            next_solve: 0,
         };
         basis.append(W, MW, pencil, sizes2.as_slice())?;
         if basis.is_exhausted() {
@@ -160,6 +161,8 @@ impl Basis {
     /// ```text
     /// G = Wᵀ M W,   V = W B with Bᵀ G B = 1,   R = Vᵀ M W = Bᵀ G
     /// ```
+    /// B is found in two passes, `B = Q L⁻ᵀ`.
+    ///
     /// * `MW`: workspace for M W.
     /// * `sizes2`: at the start, `xᵀ M x` of the columns x with W = `K⁻¹ M x`.
     fn append(
@@ -218,13 +221,13 @@ impl Basis {
     }
 
     /// Whether the projected operator should be solved now; `count`: number of requested modes.
-    pub(super) fn is_to_be_looked_at(&mut self, count: usize, limit: usize) -> bool {
+    pub(super) fn is_solve_due(&mut self, count: usize, limit: usize) -> bool {
         // The cost of the small eigenproblem grows with the cube of the basis, so a larger one is
         // solved less often.
-        if self.len() < self.next_look.max(2 * count + WIDTH) && !self.is_full(limit) {
+        if self.len() < self.next_solve.max(2 * count + WIDTH) && !self.is_full(limit) {
             return false;
         }
-        self.next_look = self.len() + (self.len() / 12).max(1);
+        self.next_solve = self.len() + (self.len() / 12).max(1);
         true
     }
 

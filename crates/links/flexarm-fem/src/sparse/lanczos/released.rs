@@ -20,8 +20,8 @@ impl Basis {
     /// Ritz pairs without the support, largest θ first.
     ///
     /// ```text
-    /// [V T]ᵀ M K_r⁻¹ M [V T] = | H + X C Xᵀ        Y + X C G   |      X = Vᵀ M T,   Y = Vᵀ M K⁻¹ M T
-    ///                          | (Y + X C G)ᵀ      S + G C G   |      G = Tᵀ M T,   S = Tᵀ M K⁻¹ M T
+    /// [V T]ᵀ M K_r⁻¹ M [V T] = [ H + X C Xᵀ     Y + X C G ]     X = Vᵀ M T,  Y = Vᵀ M K⁻¹ M T
+    ///                          [ (Y + X C G)ᵀ   S + G C G ]     G = Tᵀ M T,  S = Tᵀ M K⁻¹ M T
     /// ```
     /// where T is made orthonormal to V and in itself: `T' = (T - V X) Q`.
     pub(super) fn released_ritz(&self, released: &Released<'_>) -> Option<Ritz> {
