@@ -165,8 +165,8 @@ pub fn least_time_with_jerks(
         }
         law = law.improved(DRAWN_GAP, &mut |k, s| place(interval[k], s).drawn_in(drawn[k]));
     }
-    // The whole motion is slowed until no violation is left.
-    let slowing = law.slowing(&mut |k, s| place(of[k], s));
+    // What is left of the violation, by slowing the whole motion.
+    let slowing = law.slowing(&mut |k, s| place(interval[k], s));
     law.slowed(slowing.iter().flatten().fold(1.0, |most: f64, slowing| most.max(*slowing)))
 }
 

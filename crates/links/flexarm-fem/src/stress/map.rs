@@ -121,8 +121,6 @@ impl StressFields {
         parts: &[RigidPart],
         springs: &[Matrix6<f64>],
     ) -> Result<StressMap, StressError> {
-        // Displacement of B per displacement d_S of each joint, r from S to B in L:
-        //   u_B = X d_S,    X = [R_LS, -[r]x R_LS; 0, R_LS]
         let p_LB = self.poses[1].translation.vector;
         // Ad_BS: displacement of B, link axes, per displacement of each joint, S axes.
         let carry = |joint: &ElasticSplit| {
@@ -133,8 +131,7 @@ impl StressFields {
             Ad_BS.fixed_view_mut::<3, 3>(0, 3).copy_from(&(-p_SB.cross_matrix() * R_LS));
             Ad_BS
         };
-        let X: Vec<Matrix6<f64>> = joints.iter().map(displacement).collect();
-        // Compliances C of the joints, and the stiffness of B, K_B = (Σ X C Xᵀ)⁻¹.
+        let Ad: Vec<Matrix6<f64>> = joints.iter().map(carry).collect();
         let singular = || StressError("the stiffness of a joint is singular".into());
         let inverse = |K: &Matrix6<f64>| K.try_inverse().ok_or_else(singular);
         // Compliances C_S, and K_BB = (Σ Ad_BS C_S Ad_BSᵀ)⁻¹.
@@ -143,17 +140,16 @@ impl StressFields {
             let C_BB: Matrix6<f64> = Ad.iter().zip(&C).map(|(Ad_BS, C_S)| Ad_BS * C_S * Ad_BS.transpose()).sum();
             Ok::<_, StressError>((C, inverse(&C_BB)?))
         };
-        // The nominal joints must give the stiffness of the link of these fields.
         let (_, nominal) = at_B(&mut joints.iter().map(|joint| &joint.K_S))?;
         self.check(&DMatrix::from_column_slice(6, 6, nominal.as_slice()))?;
-        let (C, K_B) = at_B(&mut springs.iter())?;
-        // Wrench at B per joint displacement: F_B = K_B X d_S.
+        // w = K_BB Σ Ad_BS d_S: the wrench at B that gives B the displacement of the joints.
+        let (C, K_BB) = at_B(&mut springs.iter())?;
         let mut A = DMatrix::zeros(6, 6 * joints.len());
         for (k, Ad_BS) in Ad.iter().enumerate() {
             A.fixed_view_mut::<6, 6>(0, 6 * k).copy_from(&(K_BB * Ad_BS));
         }
-        // Part of F_B that is due to the deflection under the inertia loads alone, d_S = C F_S with the
-        // loads of all parts beyond the joint.
+        // w_j: the same of the joints' static response C_S F_S to each inertia load on the parts
+        // beyond.
         let own = (0..INERTIA_LOADS).map(|j| {
             let mut q = DVector::zeros(6 * joints.len());
             for (k, joint) in joints.iter().enumerate() {
