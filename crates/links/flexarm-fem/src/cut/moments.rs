@@ -1,7 +1,8 @@
 //! Mass moments of order 0, 1 and 2 about a fixed point.
 //!
-//! `∫ dm`, `∫ r dm`, `∫ r rᵀ dm` add over pieces; only [`Moments::rigid_part`] turns them into mass,
-//! centre of mass and inertia. Axes of the mesh; kg, m. Not here: integrals over solids (`piece.rs`).
+//! `∫ dm`, `∫ r dm`, `∫ r rᵀ dm` add over pieces; only [`Moments::rigid_part`] turns them into
+//! mass, centre of mass and inertia. Axes of the mesh; kg, m. Not here: integrals over solids
+//! (`piece.rs`).
 
 use nalgebra::{Matrix3, Vector3};
 

@@ -1,7 +1,7 @@
 //! Parts of a cut mesh against closed forms and integrals.
 //!
-//! Truths: half of a bar, a box cut by an oblique plane, the tetrahedron at a corner, pipes; the parts
-//! add up to the whole. Axes of the mesh; kg, m. Not here: where a link is cut (`mesh_link`).
+//! Truths: half of a bar, a box cut by an oblique plane, the tetrahedron at a corner, pipes; the
+//! parts add up to the whole. Axes of the mesh; kg, m. Not here: where a link is cut (`mesh_link`).
 
 use nalgebra::{Matrix3, Rotation3, Vector3, vector};
 

@@ -154,8 +154,8 @@ impl ModalSource<'_> {
     /// Displacements of all DoF with A clamped: under unit wrenches on the interfaces after the
     /// first, under the inertia loads, and in the fixed-interface modes.
     ///
-    /// Returns one row per DoF of the model (m, rad; link axes) and one column per unit load, in
-    /// the order of [`StressFields::stress`](crate::stress::StressFields).
+    /// Returns one row per DoF of the model (m, rad; link axes) and one column per unit load and
+    /// mode, in the order of [`StressFields::stress`](crate::stress::StressFields).
     pub fn displacements(&self) -> DMatrix<f64> {
         let (under_loads, modes) = (geometric::displacements_under_loads(self), &self.fixed_modes.shapes);
         let wrenches = under_loads.ncols() - geometric::FIELDS;

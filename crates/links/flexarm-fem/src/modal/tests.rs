@@ -1,7 +1,7 @@
 //! Integrals of meshes against brute force and the FE matrices, and geometric stiffness of solids.
 //!
-//! Truths: sums over dense Gauss points, the mass matrix of the mesh, critical loads of textbooks, the
-//! frequencies of a spinning beam from the literature. Link axes; A is fixed. Not here: files
+//! Truths: sums over dense Gauss points, the mass matrix of the mesh, critical loads of textbooks,
+//! the frequencies of a spinning beam from the literature. Link axes; A is fixed. Not here: files
 //! (`flex_file`).
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 

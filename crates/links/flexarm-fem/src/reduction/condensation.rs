@@ -325,7 +325,8 @@ impl<'m> Condensation<'m> {
     }
 
     /// Static shapes T over all DoF, and the forces λ of the distributing ties, one column per
-    /// boundary DoF: `T = B + X` with `K X + Gᵀ λ = -K B` on the free DoF and `G X = 1`.
+    /// boundary DoF: `T = B + X` with `K X + Gᵀ λ = -K B` on the free DoF and `G X = g`, where row
+    /// k of g has a one at the boundary DoF of row k of G.
     fn static_shapes(&self, columns: usize) -> (DMatrix<f64>, DMatrix<f64>) {
         let B = self.boundary.rigid_part();
         let mut X = -self.model.K.product(&B);

@@ -1,7 +1,7 @@
 //! Reduced model: a small dense stiffness and mass over interfaces and modes.
 //!
-//! Order: six DoF per interface, proximal first, linear before angular, then the modes; link axes, SI.
-//! Not here: how it is computed (`condensation`), its integrals for motion (`modal`).
+//! Order: six DoF per interface, proximal first, linear before angular, then the modes; link axes,
+//! SI. Not here: how it is computed (`condensation`), its integrals for motion (`modal`).
 
 use flexarm_spatial::{Matrix12, Pose};
 use nalgebra::{DMatrix, SymmetricEigen};

@@ -3,7 +3,9 @@
 //! ```text
 //! ε = dᵀ ε d,   ε_ii = (σ_ii - ν (σ_jj + σ_kk)) / E,   ε_ij = σ_ij / 2G
 //! ```
-//! with the direction d of the gauge in the tangent plane of the surface.
+//! with the direction d of the gauge in the tangent plane of the surface. Start at
+//! [`StressFields::strain_by_stress`]. Link axes, m, Pa. Not here: the stress
+//! ([`super::StressMap`]).
 
 use nalgebra::{Rotation3, Unit, Vector3};
 
@@ -14,8 +16,10 @@ use super::fields::StressFields;
 const TANGENTIAL: f64 = 0.1;
 
 impl StressFields {
-    /// Returns the site nearest to a point (link axes, m); of a node with several materials the
-    /// first one.
+    /// Returns the index of the site nearest to a point; of a node with several materials the first
+    /// one.
+    ///
+    /// * `point`: link axes, m.
     ///
     /// # Errors
     /// [`StressError`] if the point is farther from it than the longest edge at this node, or there
@@ -39,8 +43,17 @@ impl StressFields {
         Ok(site as usize)
     }
 
-    /// Returns the outward normal of the surface at a site: mean of its triangles with the weights
-    /// of Max (1999), *J. Graphics Tools* 4(2), which are exact on a sphere.
+    /// Returns the outward unit normal of the surface at a site, link axes: mean of its triangles
+    /// with weights that are exact on a sphere.
+    ///
+    /// ```text
+    /// n ~ Σ e × f / (|e|² |f|²)      e, f: edges of a triangle that start at the site
+    /// ```
+    /// # Panics
+    /// For an index that is not a site.
+    ///
+    /// # Source
+    /// Max (1999), *J. Graphics Tools* 4(2).
     pub fn normal(&self, site: usize) -> Vector3<f64> {
         let edge = |k: u32| self.sites[k as usize].position - self.sites[site].position;
         let weighted = self.triangles.iter().filter_map(|corners| {

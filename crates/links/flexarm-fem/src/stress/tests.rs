@@ -1,7 +1,7 @@
 //! Stress against closed forms and energies.
 //!
-//! Truths: F/A, M c/I, the centrifugal load of a bar, the energy ½ ηᵀ K η of the amplitudes, and one
-//! model of a link against another. Link axes, Pa. Not here: beams (`beam.rs`).
+//! Truths: F/A, M c/I, the centrifugal load of a bar, the energy ½ ηᵀ K η of the amplitudes, and
+//! one model of a link against another. Link axes, Pa. Not here: beams (`beam.rs`).
 #![allow(clippy::print_stderr, reason = "tables of measured errors, shown with --nocapture")]
 
 mod beam;
@@ -205,8 +205,8 @@ fn plan(bar: &Bar) -> LinkPlan {
     }
 }
 
-/// Deflections of the joints of a link at rest in a frame with the accelerations `a` and `alpha`: by
-/// Newton's law for the parts beyond each joint.
+/// Deflections of the joints of a link at rest in a frame with the accelerations `a` and `alpha`:
+/// by Newton's law for the parts beyond each joint.
 fn deflections_of_parts(
     joints: &[ElasticSplit],
     parts: &[RigidPart],

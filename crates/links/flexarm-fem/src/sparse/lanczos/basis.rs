@@ -1,8 +1,8 @@
 //! Lanczos basis, built block by block, and the projected operator.
 //!
-//! Start at [`Basis::start`] and [`Basis::advance`]; V, H, T and K⁻¹ M are those of the parent module.
-//! Vectors have one row per DoF and eight columns per block. Not here: the loop and its stopping rule
-//! (the parent), the pencil with a support released (`released.rs`).
+//! Start at [`Basis::start`] and [`Basis::advance`]; V, H, T and K⁻¹ M are those of the parent
+//! module. Vectors have one row per DoF and eight columns per block. Not here: the loop and its
+//! stopping rule (the parent), the pencil with a support released (`released.rs`).
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
