@@ -1,7 +1,7 @@
 //! Plausibility checks of stiffness against mass, and of the density of a link: detect unit errors
 //! and wrong matrices.
 //!
-//! Start at [`of_link`]. SI units, link axes. Not here: checks of the matrices themselves
+//! Start at `of_link`. SI units, link axes. Not here: checks of the matrices themselves
 //! (`flexarm_fem::gate`), caveats about robots.
 
 use flexarm_fem::{ReducedLink, RigidPart};

@@ -14,7 +14,7 @@
 //! `<up_axis>`, so that some robot files have a wrong one: [`UpAxis::Ignored`] reads them. The
 //! scale of the URDF is applied last ([`TriangleMesh::scaled`]).
 //!
-//! Start at [`load_mesh`]; every reader fills a [`Draft`]. Not here: finding files (`resolve`),
+//! Start at [`load_mesh`]; every reader fills a `Draft`. Not here: finding files (`resolve`),
 //! placing shapes on links ([`crate::Visual`]).
 
 mod collada;

@@ -1,7 +1,7 @@
 //! Caveats about a motion on the robot that follows it, and about loads on the robot that carries
 //! them.
 //!
-//! Start at [`of_motion`] and [`of_loads`]. The rigid robot is followed at 201 times. Not here: joint
+//! Start at `of_motion` and `of_loads`. The rigid robot is followed at 201 times. Not here: joint
 //! limits that a motion passes, which are errors (`motions/motion.rs`).
 
 use flexarm_kinematics::{Data, Model, State, inverse_dynamics};

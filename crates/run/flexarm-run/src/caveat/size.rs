@@ -1,7 +1,7 @@
 //! Size and mass of a robot, from which its own thresholds follow.
 //!
 //! Torques and inertias are evaluated over poses spread evenly over the joint ranges, the same in every
-//! call ([`spread_poses`]). Not here: thresholds.
+//! call (`spread_poses`). Not here: thresholds.
 
 use std::collections::HashMap;
 

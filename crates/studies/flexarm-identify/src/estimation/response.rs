@@ -113,7 +113,7 @@ pub struct StructureSlopes {
 /// damping that differs between elements is not differentiable.
 ///
 /// # Errors
-/// As [`OperatingPoint::solve`]; [`StepError::Singular`] if a coordinate has no mass.
+/// As `OperatingPoint::solve`; [`StepError::Singular`] if a coordinate has no mass.
 pub fn structure_slopes(
     nominal: &NominalArm,
     parameters: &[Parameter],
