@@ -310,7 +310,7 @@ fn changed_mechanism(
     faults: &mut Vec<Error>,
 ) -> (Mechanism, Vec<Calibration>) {
     let mut rigid = urdf.clone();
-    // Gravity and helical joints belong to the rigid robot alone.
+    // Only the rigid robot has the gravity and the helical joints of the file.
     if let Some(gravity) = &file.gravity {
         rigid.gravity = (*gravity.get_ref()).into();
         keep(check_finite("gravity", gravity.get_ref(), gravity.span(), source).map_err(Error::from), faults);

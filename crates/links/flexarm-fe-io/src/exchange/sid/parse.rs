@@ -56,7 +56,7 @@ pub fn parse_sid(text: &str, origin: &str) -> Result<Sid, FeFileError> {
     let nodes = place.integer("number of nodes", numbers.next().unwrap_or(""))?;
     let modes = place.integer("number of modes", numbers.next().unwrap_or(""))?;
 
-    // Further lines are `key = value`, or a key alone.
+    // Further lines are `key = value`, or only a key.
     let lines = lines.map(|(place, line)| match line.split_once('=') {
         Some((key, value)) => (place, key.trim(), Some(value.trim())),
         None => (place, line.trim(), None),
