@@ -165,7 +165,7 @@ pub fn least_time_with_jerks(
         }
         law = law.improved(DRAWN_GAP, &mut |k, s| place(interval[k], s).drawn_in(drawn[k]));
     }
-    // What is left of the violation, by slowing the whole motion.
+    // The whole motion is slowed until no violation is left.
     let slowing = law.slowing(&mut |k, s| place(interval[k], s));
     law.slowed(slowing.iter().flatten().fold(1.0, |most: f64, slowing| most.max(*slowing)))
 }
