@@ -34,6 +34,8 @@
 //! | --- | --- |
 //! | `five_lines` | load, run, print |
 //! | `operating_points` | an arm shared by threads, one workspace each: compliance and frequency at 10,000 poses |
+//! | `many_runs` | a study of many runs of one arm on all cores |
+//! | `prepared_runs` | processor time of a run of a prepared arm: set-up and steps |
 //! | `stop_at_rest` | an observer that examines every sample and stops the run |
 //! | `servo_study` | a study: servo gains against settling time and overshoot |
 //! | `study_report` | link models compared on one page for the browser |
