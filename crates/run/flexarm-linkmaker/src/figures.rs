@@ -20,7 +20,7 @@ pub struct StaticFigures {
     pub com_m: [f64; 3],
     /// Inertia about the centre of mass, 3×3 (kg m²).
     pub inertia: [[f64; 3]; 3],
-    /// Stiffness at B with A held, 6×6 (N/m, N/rad; N m/m, N m/rad).
+    /// Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad).
     pub stiffness: [[f64; 6]; 6],
     /// Inverse of the stiffness: displacement of B per unit load at B.
     pub compliance: [[f64; 6]; 6],

@@ -2023,7 +2023,7 @@ class ImportSummary(TypedDict):
     stiffness: list[list[float]]
     """Stiffness at B with A held, 6×6, linear first (N/m, N/rad; N m/m, N m/rad)."""
     compliance: list[list[float]]
-    """Inverse of the stiffness."""
+    """Inverse of the stiffness: displacement of B per unit load at B."""
     split_m: list[float]
     """Position of the elastic joint between the two parts."""
     parts: list[PartFigures]
@@ -2403,7 +2403,7 @@ class NewPayload(TypedDict):
 
 
 class Assumption(TypedDict):
-    """An assumption."""
+    """An assumption about the robot."""
 
     about: str
     """Subject: a joint, a link, the payload."""

@@ -119,7 +119,7 @@ pub struct MotionPeak {
     pub torque_limit: Option<f64>,
 }
 
-/// An exceeded limit: a [`LimitViolation`] with its sentence.
+/// An exceeded limit.
 #[derive(Clone, Debug, Serialize)]
 pub struct MotionViolation {
     /// Joint name.
@@ -134,7 +134,7 @@ pub struct MotionViolation {
     pub value: f64,
     /// Limit.
     pub limit: f64,
-    /// Message of [`LimitViolation::warning`].
+    /// The violation as a sentence.
     pub message: String,
 }
 
